@@ -1,0 +1,50 @@
+# What only tools need, only tools link.
+find_package(PkgConfig REQUIRED)
+pkg_check_modules(ASSIMP REQUIRED IMPORTED_TARGET assimp)
+pkg_check_modules(JANSSON REQUIRED IMPORTED_TARGET jansson)
+pkg_check_modules(POPT REQUIRED IMPORTED_TARGET popt)
+pkg_check_modules(MINIZIP REQUIRED IMPORTED_TARGET minizip)
+pkg_check_modules(PNG REQUIRED IMPORTED_TARGET libpng)
+pkg_check_modules(XXHASH REQUIRED IMPORTED_TARGET libxxhash)
+find_library(EMBREE_LIBRARY embree3 REQUIRED)
+
+file(GLOB UMB_IO_SOURCES CONFIGURE_DEPENDS tools/io/*.c)
+if(UMB_IO_SOURCES)
+  add_library(umb_io STATIC ${UMB_IO_SOURCES})
+  target_include_directories(umb_io PUBLIC tools)
+  target_link_libraries(umb_io PUBLIC umbrage PRIVATE PkgConfig::ASSIMP PkgConfig::JANSSON
+                        PkgConfig::MINIZIP PkgConfig::PNG PkgConfig::XXHASH m)
+endif()
+
+file(GLOB UMB_TRUTH_SOURCES CONFIGURE_DEPENDS tools/truth/*.c)
+if(UMB_TRUTH_SOURCES)
+  add_library(umb_truth STATIC ${UMB_TRUTH_SOURCES})
+  target_include_directories(umb_truth PUBLIC tools)
+  target_link_libraries(umb_truth PUBLIC umb_io PRIVATE ${EMBREE_LIBRARY} m)
+endif()
+
+file(GLOB UMB_PROGRAM_SOURCES CONFIGURE_DEPENDS tools/umbrage/*.c)
+if(UMB_PROGRAM_SOURCES)
+  add_executable(umbrage-program ${UMB_PROGRAM_SOURCES})
+  set_target_properties(umbrage-program PROPERTIES OUTPUT_NAME umbrage
+                        RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR})
+  target_link_libraries(umbrage-program PRIVATE umb_truth umb_io PkgConfig::JANSSON PkgConfig::POPT
+                        PkgConfig::XXHASH m)
+endif()
+
+# Tests: tests/test_NAME.c is one program. They may look inside src/ and tools/.
+pkg_check_modules(CMOCKA REQUIRED IMPORTED_TARGET cmocka)
+enable_testing()
+file(GLOB UMB_TEST_SOURCES CONFIGURE_DEPENDS tests/test_*.c)
+foreach(source ${UMB_TEST_SOURCES})
+  get_filename_component(name ${source} NAME_WE)
+  add_executable(${name} ${source})
+  target_include_directories(${name} PRIVATE src tools tests)
+  foreach(library umb_truth umb_io)
+    if(TARGET ${library})
+      target_link_libraries(${name} PRIVATE ${library})
+    endif()
+  endforeach()
+  target_link_libraries(${name} PRIVATE umbrage PkgConfig::CMOCKA m)
+  add_test(NAME ${name} COMMAND ${name})
+endforeach()

@@ -1,0 +1,40 @@
+/* Capture and replay: one frame - scene, settings, what the culler remembers, view, answer - as one
+ * little-endian block (docs/capture-format.md). A bug report is a file. */
+#ifndef UMBRAGE_CAPTURE_H
+#define UMBRAGE_CAPTURE_H
+
+#include "cull.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Write the frame that the culler answered last into bytes, if capacity allows; *size is always set to
+ * the bytes needed. Pass bytes NULL, capacity 0 to ask. UMB_ERROR_STATE before the first umb_cull;
+ * UMB_ERROR_ARGUMENT when bytes is not NULL and capacity is too small (nothing is written). */
+UMB_API umb_result umb_capture_save(const umb_culler *culler, void *bytes, size_t capacity, size_t *size);
+
+/* A loaded capture: its scene, index and culler are its own, ready for umb_cull with its view. */
+typedef struct umb_capture {
+    umb_scene *scene;
+    umb_index *index;
+    umb_culler *culler;
+    umb_view view;
+    umb_method method;
+    umb_index_kind kind;
+    uint32_t *answer; /* ids as they were answered, in order */
+    uint32_t answer_count;
+    void *block; /* owns answer */
+} umb_capture;
+
+/* Read a block. Every offset and count is checked before use; anything wrong is UMB_ERROR_FORMAT or
+ * UMB_ERROR_VERSION with text, and *out is zeroed. tasks may be zeroed. isa as for a culler. */
+UMB_API umb_result umb_capture_load(const void *bytes, size_t size, umb_isa isa, umb_tasks tasks,
+                                    umb_capture *out, umb_error *error);
+/* Free everything that a capture owns. */
+UMB_API void umb_capture_free(umb_capture *capture);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,81 @@
+/* The culler: one viewer's state over frames, and the visible set it answers with. */
+#ifndef UMBRAGE_CULL_H
+#define UMBRAGE_CULL_H
+
+#include "index.h"
+#include "view.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct umb_culler umb_culler;
+
+/* Ways to decide occlusion. */
+typedef enum umb_method {
+    UMB_METHOD_RASTER = 0, /* strict silhouette raster (docs/conservative.md); the default */
+    UMB_METHOD_NONE = 1    /* frustum culling only */
+} umb_method;
+
+/* What a method promises. */
+typedef enum umb_class {
+    UMB_CLASS_STRICT = 0,     /* nothing that can be seen is hidden, at any resolution */
+    UMB_CLASS_PIXEL = 1,      /* exact for the samples of one raster */
+    UMB_CLASS_APPROXIMATE = 2 /* the user asked for an error: contribution culling */
+} umb_class;
+
+typedef struct umb_culler_def {
+    umb_method method;
+    umb_isa isa;       /* AUTO by default; answers do not depend on it */
+    umb_error *error;  /* text of failures; may be NULL; must outlive the culler */
+} umb_culler_def;
+
+typedef struct umb_cull_stats {
+    uint32_t visible;      /* objects reported */
+    uint32_t nodes;        /* nodes opened */
+    uint32_t boxes;        /* boxes tested against the frustum */
+    uint32_t in_frustum;   /* objects that reached the occlusion test: in the frustum and not below a hidden node */
+    uint32_t queries;      /* boxes tested for occlusion (nodes, objects, occluders) */
+    uint32_t hidden_nodes; /* nodes found hidden and not opened */
+    uint32_t hidden_objects; /* objects found hidden one by one */
+    uint32_t occluders;    /* occluders drawn */
+    uint32_t edges;        /* silhouette edges drawn */
+    uint32_t small;        /* objects dropped by the contribution threshold */
+} umb_cull_stats;
+
+/* The answer. Borrowed: valid until the culler's next call. */
+typedef struct umb_visible_set {
+    const uint32_t *objects; /* ids, by nearest view depth of their bounds, ties by id */
+    const uint8_t *inside;   /* beside each id: 1 if its bounds are wholly inside the frustum, else 0 */
+    uint32_t count;
+    umb_class class_;        /* what this answer promises */
+    umb_cull_stats stats;
+} umb_visible_set;
+
+/* Make a culler over an index. Several cullers may read one index from several threads at once. */
+UMB_API umb_result umb_culler_create(const umb_index *index, const umb_culler_def *def, umb_culler **out);
+/* NULL is allowed. */
+UMB_API void umb_culler_destroy(umb_culler *culler);
+
+/* Answer one view. Allocates only when the scene or the raster has grown since the last call.
+ * Safe direction: may report a hidden object visible; never the reverse, provided every object's bounds
+ * contain what is drawn for it and every occluder lies inside what is drawn.
+ * Threads: one call at a time for each culler. Cost: proportional to what is seen.
+ * Errors: an impossible view (umb_view_check), no memory. *out is then empty. */
+UMB_API umb_result umb_cull(umb_culler *culler, const umb_view *view, umb_visible_set *out);
+
+/* The occlusion buffer after the last umb_cull: for each pixel, row by row from the top, 1 / depth of
+ * a bound that what is covered lies at or in front of; 0 where not covered. For orthographic views the
+ * value is far + 1 - depth. Returns false, with the sizes only, when pixels is NULL or capacity (in
+ * floats) is too small, or when the method has no buffer (sizes 0). */
+UMB_API bool umb_culler_read_buffer(const umb_culler *culler, float *pixels, size_t capacity,
+                                    uint32_t *width, uint32_t *height);
+
+/* "raster", "none"; "strict", "pixel", "approximate". */
+UMB_API const char *umb_method_name(umb_method method);
+UMB_API const char *umb_class_name(umb_class class_);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

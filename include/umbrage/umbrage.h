@@ -1,0 +1,14 @@
+/* Umbrage: conservative visibility culling. This header includes all the others; each stands alone.
+ * Start with scene.h, then cull.h. */
+#ifndef UMBRAGE_H
+#define UMBRAGE_H
+
+#include "base.h"
+#include "capture.h"
+#include "cull.h"
+#include "geometry.h"
+#include "index.h"
+#include "scene.h"
+#include "view.h"
+
+#endif

@@ -1,0 +1,41 @@
+/* The one tree layout that every hierarchical index shares (DESIGN: one tree, many builders). */
+#ifndef UMB_TREE_H
+#define UMB_TREE_H
+
+#include "scene/scene.h"
+#include "umbrage/index.h"
+
+/* A child reference: the kind in the top two bits, the number below. */
+#define UMB_REF_KIND 0xC0000000u
+#define UMB_REF_NODE 0x00000000u
+#define UMB_REF_OBJECT 0x40000000u
+#define UMB_REF_OCCLUDER 0x80000000u /* a stand-alone occluder */
+#define UMB_REF_NUMBER 0x3FFFFFFFu
+
+#define UMB_NODE_WIDTH 8
+
+/* Eight children whose boxes are arrays of components: one pass of SIMD covers them all. Objects are
+ * children like nodes. Slots from count on are empty: their boxes are those of slot 0, so that kernels
+ * may compute with them, and their refs are UMB_NONE. */
+typedef struct umb_node {
+    float min[3][UMB_NODE_WIDTH];
+    float max[3][UMB_NODE_WIDTH];
+    uint32_t ref[UMB_NODE_WIDTH];
+    uint32_t count;
+    uint32_t parent; /* node number, UMB_NONE for the root */
+    uint32_t pad[6];
+} umb_node;
+
+typedef struct umb_tree {
+    const umb_node *nodes; /* parents before children; the root is node 0 */
+    uint32_t node_count;   /* 0: the index is empty */
+    uint32_t item_count;
+    bool flat;             /* the nodes are a plain list of rows of eight items, no hierarchy: walk them all */
+    umb_aabb bounds;
+} umb_tree;
+
+const umb_tree *umb_index_tree(const umb_index *index);
+umb_scene *umb_index_scene(const umb_index *index);
+umb_index_kind umb_index_get_kind(const umb_index *index);
+
+#endif

@@ -1,0 +1,54 @@
+/* What lower-level readers (index, occlusion, cull, capture) see of a scene, as last committed. */
+#ifndef UMB_SCENE_H
+#define UMB_SCENE_H
+
+#include "mesh.h"
+
+/* Something that hides. World vertices are umb_transform_point(transform, position), or the positions
+ * themselves when identity is set. */
+typedef struct umb_occluder {
+    const umb_mesh *mesh; /* at least one blocking triangle */
+    umb_transform transform;
+    umb_aabb bounds;      /* of its world vertices */
+    uint32_t owner;       /* the object it belongs to; UMB_NONE for welded and hand-made ones */
+    bool identity;
+    bool mirrored;        /* the transform turns fronts into backs: compensate */
+} umb_occluder;
+
+/* An object as committed. */
+typedef struct umb_object {
+    umb_aabb bounds;
+    const umb_mesh *mesh; /* NULL without a shape. Its parts refine the bounds */
+    umb_transform transform;
+    uint32_t occluder;    /* index of the occluder it owns, or UMB_NONE */
+    bool live;            /* in use and not UMB_OBJECT_IGNORED */
+    bool identity;
+} umb_object;
+
+typedef struct umb_committed {
+    const umb_object *objects;
+    const umb_occluder *occluders; /* owned ones first, by owner; then stand-alone ones */
+    uint32_t object_count, occluder_count;
+    uint32_t first_free_occluder;  /* occluders from here on have no owner */
+    uint64_t version;              /* grows with every commit that changed something */
+    uint64_t structure;            /* grows when items came or went, not when boxes moved */
+} umb_committed;
+
+const umb_committed *umb_scene_committed(const umb_scene *scene);
+
+/* Indices register to be brought up to date by commits: update is called at the end of each. */
+typedef struct umb_scene_listener {
+    umb_result (*update)(void *user);
+    void *user;
+    struct umb_scene_listener *next;
+} umb_scene_listener;
+
+void umb_scene_listen(umb_scene *scene, umb_scene_listener *listener);
+void umb_scene_unlisten(umb_scene *scene, umb_scene_listener *listener);
+
+const umb_allocator *umb_scene_allocator(const umb_scene *scene);
+/* Fill in the scene's umb_error (if there is one) and return code. */
+umb_result umb_scene_fail(const umb_scene *scene, umb_result code, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+
+#endif
