@@ -9,7 +9,8 @@
  *              eye
  *
  * The frustum is closed. All members are doubles: the library works with them as they are, so that a
- * view has no rounding of its own.
+ * view has no rounding of its own. Besides the rules at the members: no number is larger than 1e30
+ * (but for an infinite far), ranges are at least 1e-30 wide and 1e-12 of their ends' size.
  */
 #ifndef UMBRAGE_VIEW_H
 #define UMBRAGE_VIEW_H
@@ -36,8 +37,8 @@ typedef struct umb_view {
     /* Perspective: slopes at depth 1. Orthographic: distances. x_min < x_max, y_min < y_max. */
     double x_min, x_max, y_min, y_max;
     double near_depth, far_depth; /* along forward. Perspective: 0 < near < far; far may be INFINITY */
-    uint32_t width, height;  /* the picture in pixels; 0: 1024 x 512. Used by min_pixels only */
-    uint32_t buffer_width, buffer_height; /* the method's own raster; 0: 1024 x 288. At most 8192 */
+    uint32_t width, height;  /* the picture in pixels; both 0: 1024 x 512. Used by min_pixels only */
+    uint32_t buffer_width, buffer_height; /* the method's own raster; both 0: 1024 x 288. At most 8192 */
     /* Contribution culling (Gummerus 2: step five of the pipeline). An object whose bounds cover fewer
        than this many picture pixels both ways is not reported. 0: off. More than 0 makes the answer
        approximate. */
@@ -77,7 +78,9 @@ UMB_API umb_result umb_view_look_at_ortho(umb_view *out, const double eye[3], co
                                           double far_depth);
 /* Recover a view from a projection * view matrix after Gribb and Hartmann (Gummerus 4.1): either
  * handedness, any depth range, reversed or infinite, off-centre, perspective or parallel. Matrices with
- * shear between depth and the picture (oblique near planes), NaN or no inverse are UMB_ERROR_ARGUMENT. */
+ * shear between depth and the picture (oblique near planes), NaN or no inverse are UMB_ERROR_ARGUMENT.
+ * Clip w must grow away from the eye. A parallel view's eye is put in the middle of its near rectangle,
+ * and its near_depth is 0. */
 UMB_API umb_result umb_view_from_matrix(umb_view *out, const umb_matrix_def *def);
 /* UMB_OK when the view obeys every rule written above; else UMB_ERROR_ARGUMENT, with text when error
  * is not NULL. Every call that takes a view checks it so. */
