@@ -1,0 +1,65 @@
+# The front of the house: what each target does stands in scripts/ and in CMakePresets.json.
+# `make` alone lists the targets.
+JOBS ?= $(shell nproc)
+BUILD := cmake --build
+CTEST := ctest -j $(JOBS) --output-on-failure --no-tests=error --test-dir
+
+.PHONY: help deps build demo test asan check matrix bench soak fuzz format tidy clean
+
+help: ## this list
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-8s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+deps: ## install what is missing (Debian); silent when nothing is
+	@scripts/deps build
+
+build: deps ## the program and the tests: build/release/umbrage
+	@cmake --preset release >/dev/null
+	@$(BUILD) build/release -j $(JOBS)
+
+demo: build ## cull a real level and a city, check them against exact visibility, paint pictures
+	@scripts/deps demo
+	@scripts/demo
+
+test: check build ## all tests: optimised build, then the small sets with sanitizers
+	$(CTEST) build/release
+	@$(MAKE) --no-print-directory asan
+
+asan: deps ## the small test sets with AddressSanitizer and UndefinedBehaviorSanitizer
+	@cmake --preset asan >/dev/null
+	@$(BUILD) build/asan -j $(JOBS)
+	UMBRAGE_TEST_SIZE=$${UMBRAGE_TEST_SIZE:-small} $(CTEST) build/asan
+
+check: deps ## layers, exports, headers and words
+	@scripts/check-layers
+	@scripts/check-headers
+	@scripts/check-exports
+	@scripts/check-words
+
+matrix: build ## Clang, ThreadSanitizer, scalar-only, -O0, -O3: tests, and equal answers everywhere
+	@scripts/deps build matrix
+	@scripts/matrix
+
+bench: deps ## measure: build/bench
+	@cmake --preset bench >/dev/null
+	@$(BUILD) build/bench -j $(JOBS)
+	@scripts/bench
+
+soak: build ## the long run: every scene, every view, ten thousand micro-scenes
+	@scripts/soak
+
+fuzz: deps ## fuzz every reader: FUZZ_SECONDS (60) each
+	@scripts/deps build matrix
+	@cmake --preset fuzz >/dev/null
+	@$(BUILD) build/fuzz -j $(JOBS)
+	@scripts/fuzz
+
+format: ## lay out the sources as .clang-format says
+	@scripts/deps matrix
+	@git ls-files '*.c' '*.h' | xargs clang-format -i
+
+tidy: build ## clang-tidy over the sources
+	@scripts/deps matrix
+	@git ls-files 'src/*.c' 'tools/*.c' 'examples/*.c' | xargs clang-tidy --quiet -p build/release
+
+clean: ## remove everything that was built or made
+	rm -rf build out

@@ -1,0 +1,28 @@
+# What `cmake --install` lays down: the library and its headers, a CMake package, a pkg-config file,
+# the program and its man pages.
+include(CMakePackageConfigHelpers)
+
+install(TARGETS umbrage EXPORT umbrage-targets
+        ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
+        LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}
+        RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+install(DIRECTORY include/umbrage DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
+
+set(UMB_PACKAGE_DIR ${CMAKE_INSTALL_LIBDIR}/cmake/umbrage)
+install(EXPORT umbrage-targets NAMESPACE umbrage:: DESTINATION ${UMB_PACKAGE_DIR})
+configure_package_config_file(cmake/umbrage-config.cmake.in ${CMAKE_BINARY_DIR}/umbrage-config.cmake
+                              INSTALL_DESTINATION ${UMB_PACKAGE_DIR})
+write_basic_package_version_file(${CMAKE_BINARY_DIR}/umbrage-config-version.cmake
+                                 COMPATIBILITY SameMinorVersion)
+install(FILES ${CMAKE_BINARY_DIR}/umbrage-config.cmake ${CMAKE_BINARY_DIR}/umbrage-config-version.cmake
+        DESTINATION ${UMB_PACKAGE_DIR})
+
+configure_file(cmake/umbrage.pc.in ${CMAKE_BINARY_DIR}/umbrage.pc @ONLY)
+install(FILES ${CMAKE_BINARY_DIR}/umbrage.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+
+if(TARGET umbrage-program)
+  install(TARGETS umbrage-program RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+  file(GLOB UMB_MAN_PAGES CONFIGURE_DEPENDS docs/man/*.1)
+  install(FILES ${UMB_MAN_PAGES} DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)
+endif()
+install(FILES LICENSE README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})

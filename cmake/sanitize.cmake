@@ -1,0 +1,13 @@
+# Sanitizers and fuzzing change how every file is compiled, so they are set for the whole build.
+set(UMB_SANITIZERS ${UMB_SANITIZE})
+if(UMB_FUZZ)
+  if(NOT CMAKE_C_COMPILER_ID MATCHES "Clang")
+    message(FATAL_ERROR "UMB_FUZZ needs clang: cmake -DCMAKE_C_COMPILER=clang -DUMB_FUZZ=ON ...")
+  endif()
+  set(UMB_SANITIZERS address,undefined)
+  add_compile_options(-fsanitize=fuzzer-no-link)
+endif()
+if(UMB_SANITIZERS)
+  add_compile_options(-fsanitize=${UMB_SANITIZERS} -fno-sanitize-recover=all -fno-omit-frame-pointer -g)
+  add_link_options(-fsanitize=${UMB_SANITIZERS})
+endif()
