@@ -8,7 +8,7 @@
  * in it, then v0 -> v1 too; UMB_NONE: no second triangle. A non-manifold edge is several of these: with
  * s(f) = +1 for a triangle seen from its front, -1 for a two-sided one seen from behind, 0 for one that
  * does not block now, the net multiplicity of v0 -> v1 in the boundary of the front set is
- * s(f0) - s(f1), or s(f0) + s(f1) when SAME, summed over the entries. */
+ * s(f0) - s(f1), or s(f0) + s(f1) when SAME, summed over the entries, which follow one another. */
 typedef struct umb_edge {
     uint32_t v0, v1;
     uint32_t f0, f1;
@@ -23,10 +23,25 @@ typedef struct umb_mesh {
     umb_edge *edges;
     umb_aabb *parts;          /* boxes that together hold every triangle, OPEN and degenerate ones too */
     uint32_t position_count, triangle_count, edge_count, part_count;
+    uint32_t block_position_count; /* blocking triangles use positions below this; the rest is only seen */
     uint32_t any_two_sided;
     umb_aabb bounds;          /* of all positions that a triangle uses */
     umb_aabb block_bounds;    /* of the blocking triangles; meaningless when there is none */
-    size_t bytes;
+    size_t bytes;             /* of the one block that holds the mesh and its arrays */
 } umb_mesh;
+
+/* Build a mesh. Vertices are the same where their positions are exactly equal (-0 is 0): files split
+ * vertices for normals and colours, and a split is no crack. Positions no triangle uses are left out
+ * (unless there is no triangle at all). Errors: the rules of umb_shape_def, no memory. */
+umb_result umb_mesh_create(const umb_allocator *allocator, const umb_shape_def *def, umb_mesh **out);
+void umb_mesh_destroy(const umb_allocator *allocator, umb_mesh *mesh);
+
+/* Lay out the arrays of an empty mesh in one block, for those who fill it in themselves: the counts of
+ * sizes say how long each is. NULL when there is no memory. */
+umb_mesh *umb_mesh_allocate(const umb_allocator *allocator, const umb_mesh *sizes);
+
+/* Box of positions [0, count) of the mesh under a transform, of the world vertices themselves. The
+ * box has infinities where a vertex leaves the range of floats. */
+umb_aabb umb_mesh_world_bounds(const umb_mesh *mesh, const umb_transform *transform, bool blocking_only);
 
 #endif

@@ -1,0 +1,94 @@
+#include "memory.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define ALIGNMENT 64u
+
+static void *default_reallocate(void *user, void *old, size_t old_size, size_t new_size)
+{
+    (void)user;
+    if (new_size == 0) {
+        free(old);
+        return NULL;
+    }
+    if (new_size > SIZE_MAX - ALIGNMENT) {
+        return NULL;
+    }
+    /* aligned_alloc wants a multiple of the alignment; realloc would lose the alignment. */
+    void *p = aligned_alloc(ALIGNMENT, (new_size + ALIGNMENT - 1) & ~(size_t)(ALIGNMENT - 1));
+    if (p != NULL && old != NULL) {
+        memcpy(p, old, old_size < new_size ? old_size : new_size);
+        free(old);
+    }
+    return p;
+}
+
+umb_allocator umb_memory_allocator(const umb_allocator *given)
+{
+    if (given != NULL && given->reallocate != NULL) {
+        return *given;
+    }
+    umb_allocator a = {default_reallocate, NULL};
+    return a;
+}
+
+void *umb_memory_allocate(const umb_allocator *a, size_t bytes)
+{
+    /* Nothing to hold is still a success: callers tell failure by NULL. */
+    return a->reallocate(a->user, NULL, 0, bytes == 0 ? 1 : bytes);
+}
+
+void *umb_memory_allocate_zero(const umb_allocator *a, size_t count, size_t size)
+{
+    if (size != 0 && count > SIZE_MAX / size) {
+        return NULL;
+    }
+    size_t bytes = count * size;
+    void *p = umb_memory_allocate(a, bytes);
+    if (p != NULL) {
+        memset(p, 0, bytes);
+    }
+    return p;
+}
+
+void umb_memory_free(const umb_allocator *a, void *p, size_t bytes)
+{
+    if (p != NULL) {
+        a->reallocate(a->user, p, bytes == 0 ? 1 : bytes, 0);
+    }
+}
+
+bool umb_memory_reserve(const umb_allocator *a, void **array, size_t *capacity, size_t need, size_t size)
+{
+    if (need <= *capacity) {
+        return true;
+    }
+    size_t grown = *capacity + *capacity / 2;
+    size_t wanted = grown > need ? grown : need;
+    if (size != 0 && wanted > SIZE_MAX / size) {
+        return false;
+    }
+    void *p = a->reallocate(a->user, *array, *capacity * size, wanted * size);
+    if (p == NULL) {
+        return false;
+    }
+    *array = p;
+    *capacity = wanted;
+    return true;
+}
+
+umb_result umb_error_set(umb_error *error, umb_result code, const char *format, ...)
+{
+    if (error != NULL) {
+        va_list arguments;
+        va_start(arguments, format);
+        error->code = code;
+        error->text[0] = '\0';
+        (void)vsnprintf(error->text, sizeof error->text, format, arguments);
+        va_end(arguments);
+    }
+    return code;
+}

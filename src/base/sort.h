@@ -1,0 +1,22 @@
+/* Sorting by 64-bit keys, stable, in time proportional to the number of elements. */
+#ifndef UMB_SORT_H
+#define UMB_SORT_H
+
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+/* Sort keys ascending and carry values along. The scratch arrays hold count elements each. */
+void umb_sort_keys(uint64_t *keys, uint32_t *values, uint64_t *key_scratch, uint32_t *value_scratch,
+                   size_t count);
+
+/* An unsigned number in the order of the float; -0 and 0 are equal. f is no NaN. */
+static inline uint32_t umb_sort_float(float f)
+{
+    uint32_t bits;
+    f += 0.0f;
+    memcpy(&bits, &f, sizeof bits);
+    return (bits & 0x80000000u) != 0 ? ~bits : bits | 0x80000000u;
+}
+
+#endif

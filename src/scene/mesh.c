@@ -1,0 +1,309 @@
+#include "mesh.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/scratch.h"
+#include "geometry/collinear.h"
+#include "geometry/transform.h"
+#include "mesh_edges.h"
+#include "mesh_parts.h"
+
+#define MAX_COUNT (1u << 30)
+#define ALIGNMENT 64u
+
+/* Everything known of a shape before its size is known. */
+typedef struct mesh_builder {
+    const umb_shape_def *def;
+    uint32_t stride, triangle_count;
+    uint32_t *merged;         /* per position of the definition: its vertex, or UMB_NONE */
+    uint32_t *table;          /* hash table of vertices, UMB_NONE where empty */
+    uint32_t table_mask;
+    float (*positions)[3];
+    uint32_t position_count, block_position_count;
+    uint32_t (*triangles)[3]; /* blocking ones first */
+    uint8_t *two_sided;
+    uint32_t blocking_count;
+} mesh_builder;
+
+static void read_position(const mesh_builder *b, uint32_t i, float out[3])
+{
+    memcpy(out, (const char *)b->def->positions + (size_t)i * b->stride, 3 * sizeof(float));
+    for (int k = 0; k < 3; ++k) {
+        out[k] += 0.0f; /* -0 becomes 0 */
+    }
+}
+
+static umb_result check_def(const umb_shape_def *def)
+{
+    if (def == NULL || def->positions == NULL || def->position_count == 0 || def->index_count % 3 != 0 ||
+        (def->indices == NULL && def->index_count > 0) ||
+        (def->position_stride != 0 && def->position_stride < 3 * sizeof(float))) {
+        return UMB_ERROR_ARGUMENT;
+    }
+    if (def->position_count > MAX_COUNT || def->index_count / 3 > MAX_COUNT) {
+        return UMB_ERROR_LIMIT;
+    }
+    for (uint32_t i = 0; i < def->index_count; ++i) {
+        if (def->indices[i] >= def->position_count) {
+            return UMB_ERROR_ARGUMENT;
+        }
+    }
+    return UMB_OK;
+}
+
+static bool all_finite(const mesh_builder *b)
+{
+    for (uint32_t i = 0; i < b->def->position_count; ++i) {
+        float p[3];
+        read_position(b, i, p);
+        if (!isfinite(p[0]) || !isfinite(p[1]) || !isfinite(p[2])) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static uint32_t hash_position(const float p[3])
+{
+    uint32_t bits[3];
+    memcpy(bits, p, sizeof bits);
+    uint64_t h = bits[0] * 0x9E3779B97F4A7C15u;
+    h = (h ^ (h >> 32) ^ bits[1]) * 0xBF58476D1CE4E5B9u;
+    h = (h ^ (h >> 32) ^ bits[2]) * 0x94D049BB133111EBu;
+    return (uint32_t)(h >> 32);
+}
+
+/* The vertex of position i of the definition, numbered by first use. */
+static uint32_t merge_position(mesh_builder *b, uint32_t i)
+{
+    if (b->merged[i] != UMB_NONE) {
+        return b->merged[i];
+    }
+    float p[3];
+    read_position(b, i, p);
+    uint32_t slot = hash_position(p) & b->table_mask;
+    while (b->table[slot] != UMB_NONE && memcmp(b->positions[b->table[slot]], p, sizeof p) != 0) {
+        slot = (slot + 1) & b->table_mask;
+    }
+    if (b->table[slot] == UMB_NONE) {
+        b->table[slot] = b->position_count;
+        memcpy(b->positions[b->position_count], p, sizeof p);
+        b->position_count += 1;
+    }
+    b->merged[i] = b->table[slot];
+    return b->merged[i];
+}
+
+static bool blocks(const mesh_builder *b, uint32_t t)
+{
+    const uint8_t *flags = b->def->triangle_flags;
+    if (flags != NULL && (flags[t] & UMB_TRIANGLE_OPEN) != 0) {
+        return false;
+    }
+    float p[3][3];
+    for (int c = 0; c < 3; ++c) {
+        read_position(b, b->def->indices[3 * (size_t)t + c], p[c]);
+    }
+    return !umb_collinear(p[0], p[1], p[2]);
+}
+
+/* Blocking triangles first, then the others, each kind in the order of the definition. */
+static void merge_triangles(mesh_builder *b)
+{
+    uint32_t count = 0;
+    for (uint32_t t = 0; t < b->triangle_count; ++t) {
+        if (blocks(b, t)) {
+            const uint8_t *flags = b->def->triangle_flags;
+            b->two_sided[count] = flags != NULL && (flags[t] & UMB_TRIANGLE_TWO_SIDED) != 0;
+            for (int c = 0; c < 3; ++c) {
+                b->triangles[count][c] = merge_position(b, b->def->indices[3 * (size_t)t + c]);
+            }
+            count += 1;
+        }
+    }
+    b->blocking_count = count;
+    b->block_position_count = b->position_count;
+    for (uint32_t t = 0; t < b->triangle_count; ++t) {
+        if (!blocks(b, t)) {
+            for (int c = 0; c < 3; ++c) {
+                b->triangles[count][c] = merge_position(b, b->def->indices[3 * (size_t)t + c]);
+            }
+            count += 1;
+        }
+    }
+    if (b->triangle_count == 0) {
+        for (uint32_t i = 0; i < b->def->position_count; ++i) {
+            (void)merge_position(b, i);
+        }
+    }
+}
+
+static bool allocate_builder(mesh_builder *b, umb_scratch *scratch)
+{
+    size_t n = b->def->position_count, size = 16;
+    while (size < 2 * n) {
+        size *= 2;
+    }
+    b->table_mask = (uint32_t)(size - 1);
+    b->merged = umb_scratch_get(scratch, n, sizeof *b->merged);
+    b->table = umb_scratch_get(scratch, size, sizeof *b->table);
+    b->positions = umb_scratch_get(scratch, n, sizeof *b->positions);
+    b->triangles = umb_scratch_get(scratch, b->triangle_count, sizeof *b->triangles);
+    b->two_sided = umb_scratch_get_zero(scratch, b->triangle_count, sizeof *b->two_sided);
+    if (scratch->failed) {
+        return false;
+    }
+    memset(b->merged, 0xFF, n * sizeof *b->merged);
+    memset(b->table, 0xFF, size * sizeof *b->table);
+    return true;
+}
+
+static umb_aabb bounds_of(const float (*positions)[3], uint32_t count)
+{
+    umb_aabb box = {{0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}};
+    for (uint32_t i = 0; i < count; ++i) {
+        for (int k = 0; k < 3; ++k) {
+            float x = positions[i][k];
+            box.min[k] = i == 0 || x < box.min[k] ? x : box.min[k];
+            box.max[k] = i == 0 || x > box.max[k] ? x : box.max[k];
+        }
+    }
+    return box;
+}
+
+static size_t round_up(size_t bytes)
+{
+    return (bytes + ALIGNMENT - 1) & ~(size_t)(ALIGNMENT - 1);
+}
+
+umb_mesh *umb_mesh_allocate(const umb_allocator *allocator, const umb_mesh *sizes)
+{
+    size_t positions = round_up(sizeof(umb_mesh));
+    size_t triangles = positions + round_up(sizes->position_count * sizeof *sizes->positions);
+    size_t two_sided = triangles + round_up(sizes->triangle_count * sizeof *sizes->triangles);
+    size_t edges = two_sided + round_up(sizes->triangle_count * sizeof *sizes->two_sided);
+    size_t parts = edges + round_up(sizes->edge_count * sizeof *sizes->edges);
+    size_t bytes = parts + round_up(sizes->part_count * sizeof *sizes->parts);
+    char *block = umb_memory_allocate(allocator, bytes);
+    if (block == NULL) {
+        return NULL;
+    }
+    umb_mesh *m = (umb_mesh *)(void *)block;
+    *m = *sizes;
+    m->positions = (float(*)[3])(void *)(block + positions);
+    m->triangles = (uint32_t(*)[3])(void *)(block + triangles);
+    m->two_sided = (uint8_t *)(block + two_sided);
+    m->edges = (umb_edge *)(void *)(block + edges);
+    m->parts = (umb_aabb *)(void *)(block + parts);
+    m->bytes = bytes;
+    return m;
+}
+
+/* Copy what was built into one block. */
+static umb_mesh *pack(const umb_allocator *allocator, const mesh_builder *b, const umb_edge *edges,
+                      uint32_t edge_count, const umb_aabb *parts, uint32_t part_count)
+{
+    umb_mesh sizes = {0};
+    sizes.position_count = b->position_count;
+    sizes.block_position_count = b->block_position_count;
+    sizes.triangle_count = b->blocking_count;
+    sizes.edge_count = edge_count;
+    sizes.part_count = part_count;
+    umb_mesh *m = umb_mesh_allocate(allocator, &sizes);
+    if (m == NULL) {
+        return NULL;
+    }
+    memcpy(m->positions, b->positions, b->position_count * sizeof *m->positions);
+    memcpy(m->triangles, b->triangles, b->blocking_count * sizeof *m->triangles);
+    memcpy(m->two_sided, b->two_sided, b->blocking_count * sizeof *m->two_sided);
+    memcpy(m->edges, edges, edge_count * sizeof *m->edges);
+    memcpy(m->parts, parts, part_count * sizeof *m->parts);
+    for (uint32_t t = 0; t < m->triangle_count; ++t) {
+        m->any_two_sided |= m->two_sided[t];
+    }
+    m->bounds = bounds_of((const float(*)[3])m->positions, m->position_count);
+    m->block_bounds = bounds_of((const float(*)[3])m->positions, m->block_position_count);
+    return m;
+}
+
+umb_result umb_mesh_create(const umb_allocator *allocator, const umb_shape_def *def, umb_mesh **out)
+{
+    *out = NULL;
+    umb_result result = check_def(def);
+    if (result != UMB_OK) {
+        return result;
+    }
+    mesh_builder b = {.def = def, .triangle_count = def->index_count / 3};
+    b.stride = def->position_stride != 0 ? def->position_stride : (uint32_t)(3 * sizeof(float));
+    if (!all_finite(&b)) {
+        return UMB_ERROR_ARGUMENT;
+    }
+    umb_scratch scratch = {.allocator = allocator};
+    if (allocate_builder(&b, &scratch)) {
+        merge_triangles(&b);
+        umb_scratch_drop(&scratch, b.merged);
+        umb_scratch_drop(&scratch, b.table);
+        uint32_t edge_count = 0, part_count = 1;
+        const uint32_t(*triangles)[3] = (const uint32_t(*)[3])b.triangles;
+        umb_edge *edges =
+            umb_mesh_edges_build(&scratch, triangles, b.two_sided, b.blocking_count, &edge_count);
+        umb_aabb whole = bounds_of((const float(*)[3])b.positions, b.position_count);
+        const umb_aabb *parts = &whole;
+        if (b.triangle_count > 0) {
+            parts = umb_mesh_parts_build(&scratch, (const float(*)[3])b.positions, triangles,
+                                         b.triangle_count, &part_count);
+        }
+        if (!scratch.failed) {
+            *out = pack(allocator, &b, edges, edge_count, parts, part_count);
+        }
+    }
+    umb_scratch_free(&scratch);
+    return *out != NULL ? UMB_OK : UMB_ERROR_MEMORY;
+}
+
+void umb_mesh_destroy(const umb_allocator *allocator, umb_mesh *mesh)
+{
+    if (mesh != NULL) {
+        umb_memory_free(allocator, mesh, mesh->bytes);
+    }
+}
+
+/* True if each row looks at one axis at most: then rounding keeps order along it, and the image of the
+ * box's corners is exactly the box of the images. */
+static bool keeps_boxes(const umb_transform *t)
+{
+    for (int i = 0; i < 3; ++i) {
+        if ((t->m[i][0] != 0.0f) + (t->m[i][1] != 0.0f) + (t->m[i][2] != 0.0f) > 1) {
+            return false;
+        }
+    }
+    return true;
+}
+
+umb_aabb umb_mesh_world_bounds(const umb_mesh *mesh, const umb_transform *transform, bool blocking_only)
+{
+    const umb_aabb *own = blocking_only ? &mesh->block_bounds : &mesh->bounds;
+    if (umb_transform_is_identity(transform)) {
+        return *own;
+    }
+    float corners[2][3];
+    const float(*points)[3] = (const float(*)[3])mesh->positions;
+    uint32_t count = blocking_only ? mesh->block_position_count : mesh->position_count;
+    if (keeps_boxes(transform)) {
+        memcpy(corners[0], own->min, sizeof corners[0]);
+        memcpy(corners[1], own->max, sizeof corners[1]);
+        points = (const float(*)[3])corners;
+        count = 2;
+    }
+    umb_aabb box = {{0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}};
+    for (uint32_t i = 0; i < count; ++i) {
+        float p[3];
+        umb_transform_point(transform, points[i], p);
+        for (int k = 0; k < 3; ++k) {
+            box.min[k] = i == 0 || p[k] < box.min[k] ? p[k] : box.min[k];
+            box.max[k] = i == 0 || p[k] > box.max[k] ? p[k] : box.max[k];
+        }
+    }
+    return box;
+}
