@@ -59,7 +59,7 @@ format: ## lay out the sources as .clang-format says
 
 tidy: build ## clang-tidy over the sources
 	@scripts/deps matrix
-	@git ls-files 'src/*.c' 'tools/*.c' 'examples/*.c' | xargs clang-tidy --quiet -p build/release
+	@git ls-files 'src/*.c' 'tools/*.c' 'examples/*.c' | xargs -n 1 -P $(JOBS) clang-tidy --quiet -p build/release
 
 clean: ## remove everything that was built or made
 	rm -rf build out
