@@ -31,7 +31,9 @@ typedef struct umb_tree {
     uint32_t node_count;   /* 0: the index is empty */
     uint32_t item_count;
     bool flat;             /* the nodes are a plain list of rows of eight items, no hierarchy: walk them all */
-    umb_aabb bounds;
+    umb_aabb bounds;       /* of all items; zero when empty */
+    uint64_t version;      /* of the commit it shows. Behind the scene's only after an update that found no
+                              memory: answers would then be wrong, so readers refuse (UMB_ERROR_STATE) */
 } umb_tree;
 
 const umb_tree *umb_index_tree(const umb_index *index);

@@ -1,0 +1,175 @@
+/* The wide half of the build, and refitting. */
+#include "bvh.h"
+
+#include <string.h>
+
+/* ---- nodes ---------------------------------------------------------------------------------- */
+
+static void set_slot(umb_node *node, uint32_t slot, const float min[3], const float max[3],
+                     uint32_t ref)
+{
+    for (int i = 0; i < 3; ++i) {
+        node->min[i][slot] = min[i];
+        node->max[i][slot] = max[i];
+    }
+    node->ref[slot] = ref;
+}
+
+void umb_node_pad(umb_node *node)
+{
+    for (uint32_t slot = node->count; slot < UMB_NODE_WIDTH; ++slot) {
+        for (int i = 0; i < 3; ++i) {
+            node->min[i][slot] = node->min[i][0];
+            node->max[i][slot] = node->max[i][0];
+        }
+        node->ref[slot] = UMB_NONE;
+    }
+}
+
+umb_aabb umb_node_bounds(const umb_node *node)
+{
+    umb_aabb b;
+    for (int i = 0; i < 3; ++i) {
+        float low = node->min[i][0];
+        float high = node->max[i][0];
+        for (uint32_t slot = 1; slot < node->count; ++slot) {
+            low = node->min[i][slot] < low ? node->min[i][slot] : low;
+            high = node->max[i][slot] > high ? node->max[i][slot] : high;
+        }
+        b.min[i] = low;
+        b.max[i] = high;
+    }
+    return b;
+}
+
+/* ---- wide nodes ----------------------------------------------------------------------------- */
+
+typedef struct emitter {
+    const umb_bvh_item *items;
+    const umb_bvh_split *splits;
+    umb_node *nodes;
+    uint32_t next;
+} emitter;
+
+/* Append to slots what stands for a subtree in at most j slots. */
+static uint32_t gather(const umb_bvh_split *splits, uint32_t node, int j, uint32_t slots[],
+                       uint32_t count)
+{
+    if (node & UMB_BVH_ITEM) {
+        slots[count] = node;
+        return count + 1;
+    }
+    const umb_bvh_split *s = &splits[node];
+    while (j > 1 && s->pick[j] == 0) {
+        --j;
+    }
+    if (j == 1) {
+        slots[count] = node;
+        return count + 1;
+    }
+    count = gather(splits, s->left, s->pick[j], slots, count);
+    return gather(splits, s->right, j - s->pick[j], slots, count);
+}
+
+/* The slots of the wide node at a subtree's root. */
+static uint32_t open_node(const umb_bvh_split *splits, uint32_t node, uint32_t slots[UMB_NODE_WIDTH])
+{
+    if (node & UMB_BVH_ITEM) {
+        slots[0] = node;
+        return 1;
+    }
+    const umb_bvh_split *s = &splits[node];
+    uint32_t count = gather(splits, s->left, s->pick[UMB_NODE_WIDTH], slots, 0);
+    return gather(splits, s->right, UMB_NODE_WIDTH - s->pick[UMB_NODE_WIDTH], slots, count);
+}
+
+static uint32_t count_nodes(const umb_bvh_split *splits, uint32_t node)
+{
+    uint32_t slots[UMB_NODE_WIDTH];
+    uint32_t count = open_node(splits, node, slots);
+    uint32_t total = 1;
+    for (uint32_t i = 0; i < count; ++i) {
+        if ((slots[i] & UMB_BVH_ITEM) == 0) {
+            total += count_nodes(splits, slots[i]);
+        }
+    }
+    return total;
+}
+
+static void emit(emitter *e, uint32_t split, uint32_t number, uint32_t parent)
+{
+    uint32_t slots[UMB_NODE_WIDTH];
+    umb_node *node = &e->nodes[number];
+    memset(node, 0, sizeof(*node));
+    node->parent = parent;
+    node->count = open_node(e->splits, split, slots);
+    for (uint32_t i = 0; i < node->count; ++i) {
+        if (slots[i] & UMB_BVH_ITEM) {
+            const umb_bvh_item *item = &e->items[slots[i] & ~UMB_BVH_ITEM];
+            set_slot(node, i, item->min, item->max, item->ref);
+        } else {
+            const umb_bvh_split *s = &e->splits[slots[i]];
+            set_slot(node, i, s->min, s->max, UMB_REF_NODE | e->next++);
+        }
+    }
+    umb_node_pad(node);
+    for (uint32_t i = 0; i < node->count; ++i) {
+        if ((slots[i] & UMB_BVH_ITEM) == 0) {
+            emit(e, slots[i], node->ref[i] & UMB_REF_NUMBER, number);
+        }
+    }
+}
+
+umb_result umb_bvh_build(const umb_allocator *a, const umb_tasks *tasks, umb_bvh_item *items,
+                         uint32_t count, umb_node **nodes, uint32_t *node_count)
+{
+    *nodes = NULL;
+    *node_count = 0;
+    size_t bytes = (size_t)count * sizeof(umb_bvh_split);
+    umb_bvh_split *splits = umb_memory_allocate(a, bytes);
+    if (splits == NULL) {
+        return UMB_ERROR_MEMORY;
+    }
+    uint32_t root;
+    umb_result result = umb_bvh_split_items(a, tasks, items, count, splits, &root);
+    if (result == UMB_OK) {
+        uint32_t total = count_nodes(splits, root);
+        emitter e = {items, splits, umb_memory_allocate(a, total * sizeof(umb_node)), 1};
+        if (e.nodes != NULL) {
+            emit(&e, root, 0, UMB_NONE);
+            *nodes = e.nodes;
+            *node_count = total;
+        } else {
+            result = UMB_ERROR_MEMORY;
+        }
+    }
+    umb_memory_free(a, splits, bytes);
+    return result;
+}
+
+/* ---- refitting ------------------------------------------------------------------------------ */
+
+void umb_bvh_refit(umb_node *nodes, uint32_t node_count, const umb_committed *scene)
+{
+    for (uint32_t k = node_count; k-- > 0;) {
+        umb_node *node = &nodes[k];
+        for (uint32_t slot = 0; slot < node->count; ++slot) {
+            uint32_t ref = node->ref[slot];
+            uint32_t number = ref & UMB_REF_NUMBER;
+            umb_aabb box;
+            switch (ref & UMB_REF_KIND) {
+            case UMB_REF_NODE:
+                box = umb_node_bounds(&nodes[number]);
+                break;
+            case UMB_REF_OBJECT:
+                box = scene->objects[number].bounds;
+                break;
+            default:
+                box = scene->occluders[number].bounds;
+                break;
+            }
+            set_slot(node, slot, box.min, box.max, ref);
+        }
+        umb_node_pad(node);
+    }
+}

@@ -1,0 +1,45 @@
+/* Building and refitting a bounding volume hierarchy in the shared tree layout. */
+#ifndef UMB_BVH_H
+#define UMB_BVH_H
+
+#include "base/memory.h"
+#include "tree.h"
+
+/* A box and what it stands for. The fourth lane of min and max is never looked at: it lets four lanes
+ * be worked on at once. */
+typedef struct umb_bvh_item {
+    float min[4];
+    float max[4];
+    uint32_t ref; /* UMB_REF_OBJECT or UMB_REF_OCCLUDER */
+} umb_bvh_item;
+
+/* Build over count >= 1 items, whose order it changes. *nodes is allocated with a (*node_count entries)
+ * and laid out parents first, siblings side by side. The tree depends on items and their order alone,
+ * never on tasks. UMB_ERROR_MEMORY leaves nothing behind. */
+umb_result umb_bvh_build(const umb_allocator *a, const umb_tasks *tasks, umb_bvh_item *items,
+                         uint32_t count, umb_node **nodes, uint32_t *node_count);
+
+/* Put the committed boxes into the slots again, leaves to root; the structure stays. */
+void umb_bvh_refit(umb_node *nodes, uint32_t node_count, const umb_committed *scene);
+
+/* Make the slots from count on as the layout wants them: slot 0's box, no reference. */
+void umb_node_pad(umb_node *node);
+/* Box around a node's slots. */
+umb_aabb umb_node_bounds(const umb_node *node);
+
+/* Split items into a binary tree; bvh_split.c. Node k of the tree splits its items between k - 1 and
+ * k: every position is used once, so threads need no counter to number their nodes. */
+typedef struct umb_bvh_split {
+    float min[3], max[3];
+    uint32_t left, right; /* a split, or an item with UMB_BVH_ITEM set */
+    float cost[8];        /* [j]: of this subtree in at most j slots of a wide node; [0] unused */
+    uint8_t pick[9];      /* [j]: how many of j slots go left; 0: as for j - 1. [8]: of its own node */
+} umb_bvh_split;
+
+#define UMB_BVH_ITEM 0x80000000u
+
+/* splits has count entries ([0] is unused). Returns the root: a split, or item 0 when count is 1. */
+umb_result umb_bvh_split_items(const umb_allocator *a, const umb_tasks *tasks, umb_bvh_item *items,
+                               uint32_t count, umb_bvh_split *splits, uint32_t *root);
+
+#endif

@@ -1,0 +1,390 @@
+/* The binary half of the build: top-down splits by the surface-area heuristic over bins, and bottom-up
+ * the cheapest way to cut the binary tree into wide nodes.
+ *
+ * Ranges of items up to TASK_ITEMS are independent tasks. Which ranges these are depends on the items
+ * alone, and so does everything done in them.
+ */
+#include <math.h>
+#include <string.h>
+
+#include "bvh.h"
+
+#define BINS 16
+#define TASK_ITEMS 4096
+/* Up to this many items all splits of the sorted order are tried instead of bins. */
+#define SWEEP_ITEMS 8
+/* Below this depth ranges are halved: the tree is never deeper than this plus log2 of the count. */
+#define HALVE_DEPTH 48
+
+/* What a wide node costs beside its area over the root's, times the count of items. Area alone is the
+ * chance of a ray; a region in view opens every node in it, and pays for nodes that are not full.
+ * Measured on 200,000 boxes: 20 opens 1 to 16 % fewer nodes than 0 does in boxes of every size, for 1.4 %
+ * more of the rays' cost; 100 starts to cost more in small regions. */
+#define NODE_COST 20.0
+
+typedef struct box4 {
+    float min[4], max[4];
+} box4;
+
+typedef struct range {
+    uint32_t first, end; /* items */
+    uint32_t depth;
+    uint32_t *link; /* where the number of its root goes */
+    box4 box;
+} range;
+
+typedef struct build {
+    umb_bvh_item *items;
+    umb_bvh_split *splits;
+    double inverse_root_area, node_cost;
+    range *tasks;
+    size_t task_capacity;
+    uint32_t task_count;
+    const umb_allocator *allocator;
+} build;
+
+/* ---- boxes ---------------------------------------------------------------------------------- */
+
+static const box4 empty_box = {{INFINITY, INFINITY, INFINITY, INFINITY},
+                               {-INFINITY, -INFINITY, -INFINITY, -INFINITY}};
+
+static inline void box_grow(box4 *b, const float min[4], const float max[4])
+{
+    for (int i = 0; i < 4; ++i) {
+        b->min[i] = min[i] < b->min[i] ? min[i] : b->min[i];
+    }
+    for (int i = 0; i < 4; ++i) {
+        b->max[i] = max[i] > b->max[i] ? max[i] : b->max[i];
+    }
+}
+
+/* Half the surface, in double: the extents of finite floats cannot overflow it. 0 for an empty box. */
+static double box_area(const float min[], const float max[])
+{
+    double x = (double)max[0] - min[0];
+    double y = (double)max[1] - min[1];
+    double z = (double)max[2] - min[2];
+    return x >= 0.0 ? x * y + y * z + z * x : 0.0;
+}
+
+/* A quarter of the sum of the corners: half the centre, so that differences of any two are finite. */
+static inline float centroid(const umb_bvh_item *item, int axis)
+{
+    return 0.25f * item->min[axis] + 0.25f * item->max[axis];
+}
+
+static box4 centroid_box(const umb_bvh_item *items, const range *r)
+{
+    box4 b = empty_box;
+    for (uint32_t k = r->first; k < r->end; ++k) {
+        float c[4];
+        for (int i = 0; i < 4; ++i) {
+            c[i] = 0.25f * items[k].min[i] + 0.25f * items[k].max[i];
+        }
+        box_grow(&b, c, c);
+    }
+    return b;
+}
+
+/* ---- choosing a split ----------------------------------------------------------------------- */
+
+typedef struct choice {
+    double cost;      /* areas times counts; INFINITY: none */
+    uint32_t balance; /* the smaller side's count: breaks ties, so that flat sets are halved */
+    int axis;
+    int bin;          /* items in lower bins go left; in a sweep: that many items go left */
+    box4 left, right;
+} choice;
+
+static void consider(choice *best, double cost, uint32_t left, uint32_t right, int axis, int bin,
+                     const box4 *left_box, const box4 *right_box)
+{
+    uint32_t balance = left < right ? left : right;
+    if (cost < best->cost || (cost == best->cost && balance > best->balance)) {
+        best->cost = cost;
+        best->balance = balance;
+        best->axis = axis;
+        best->bin = bin;
+        best->left = *left_box;
+        best->right = *right_box;
+    }
+}
+
+typedef struct bins {
+    box4 box[3][BINS];
+    uint32_t count[3][BINS];
+    float low[3], scale[3]; /* bin = (centroid - low) * scale; scale 0: the axis cannot be split */
+} bins;
+
+static inline int bin_of(const bins *b, const umb_bvh_item *item, int axis)
+{
+    int k = (int)((centroid(item, axis) - b->low[axis]) * b->scale[axis]);
+    return k < BINS ? k : BINS - 1;
+}
+
+static void fill_bins(bins *b, const umb_bvh_item *items, const range *r)
+{
+    box4 centres = centroid_box(items, r);
+    for (int axis = 0; axis < 3; ++axis) {
+        float extent = centres.max[axis] - centres.min[axis];
+        float scale = extent > 0.0f ? (float)BINS / extent : 0.0f;
+        b->low[axis] = centres.min[axis];
+        /* The reciprocal of a denormal extent may overflow: such an axis counts as flat. */
+        b->scale[axis] = isfinite(scale) ? scale : 0.0f;
+        for (int i = 0; i < BINS; ++i) {
+            b->box[axis][i] = empty_box;
+            b->count[axis][i] = 0;
+        }
+    }
+    for (uint32_t k = r->first; k < r->end; ++k) {
+        const umb_bvh_item *item = &items[k];
+        for (int axis = 0; axis < 3; ++axis) {
+            int i = bin_of(b, item, axis);
+            box_grow(&b->box[axis][i], item->min, item->max);
+            ++b->count[axis][i];
+        }
+    }
+}
+
+static void choose_bin(const bins *b, int axis, choice *best)
+{
+    box4 right[BINS];
+    uint32_t right_count[BINS];
+    box4 box = empty_box;
+    uint32_t n = 0;
+    for (int i = BINS - 1; i > 0; --i) {
+        box_grow(&box, b->box[axis][i].min, b->box[axis][i].max);
+        n += b->count[axis][i];
+        right[i] = box;
+        right_count[i] = n;
+    }
+    box = empty_box;
+    n = 0;
+    for (int i = 1; i < BINS; ++i) {
+        box_grow(&box, b->box[axis][i - 1].min, b->box[axis][i - 1].max);
+        n += b->count[axis][i - 1];
+        if (n > 0 && right_count[i] > 0) {
+            double cost = box_area(box.min, box.max) * n +
+                          box_area(right[i].min, right[i].max) * right_count[i];
+            consider(best, cost, n, right_count[i], axis, i, &box, &right[i]);
+        }
+    }
+}
+
+static uint32_t partition(const bins *b, umb_bvh_item *items, const range *r, const choice *c)
+{
+    uint32_t i = r->first;
+    uint32_t j = r->end;
+    for (;;) {
+        while (i < j && bin_of(b, &items[i], c->axis) < c->bin) {
+            ++i;
+        }
+        while (i < j && bin_of(b, &items[j - 1], c->axis) >= c->bin) {
+            --j;
+        }
+        if (i >= j) {
+            return i;
+        }
+        umb_bvh_item t = items[i];
+        items[i] = items[j - 1];
+        items[j - 1] = t;
+    }
+}
+
+/* Sort a few items by centroid; stable, so that the result is one function of the input's order. */
+static void sort_items(umb_bvh_item *items, uint32_t n, int axis)
+{
+    for (uint32_t i = 1; i < n; ++i) {
+        umb_bvh_item t = items[i];
+        float c = centroid(&t, axis);
+        uint32_t j = i;
+        for (; j > 0 && centroid(&items[j - 1], axis) > c; --j) {
+            items[j] = items[j - 1];
+        }
+        items[j] = t;
+    }
+}
+
+static void sweep_axis(const umb_bvh_item *items, uint32_t n, int axis, choice *best)
+{
+    box4 right[SWEEP_ITEMS];
+    box4 box = empty_box;
+    for (uint32_t i = n - 1; i > 0; --i) {
+        box_grow(&box, items[i].min, items[i].max);
+        right[i] = box;
+    }
+    box = empty_box;
+    for (uint32_t i = 1; i < n; ++i) {
+        box_grow(&box, items[i - 1].min, items[i - 1].max);
+        double cost =
+            box_area(box.min, box.max) * i + box_area(right[i].min, right[i].max) * (n - i);
+        consider(best, cost, i, n - i, axis, (int)i, &box, &right[i]);
+    }
+}
+
+static uint32_t split_by_sweep(umb_bvh_item *items, const range *r, choice *best)
+{
+    uint32_t n = r->end - r->first;
+    umb_bvh_item sorted[3][SWEEP_ITEMS];
+    for (int axis = 0; axis < 3; ++axis) {
+        memcpy(sorted[axis], items + r->first, n * sizeof(items[0]));
+        sort_items(sorted[axis], n, axis);
+        sweep_axis(sorted[axis], n, axis, best);
+    }
+    memcpy(items + r->first, sorted[best->axis], n * sizeof(items[0]));
+    return r->first + (uint32_t)best->bin;
+}
+
+static uint32_t split_in_half(const umb_bvh_item *items, const range *r, choice *best)
+{
+    uint32_t middle = r->first + (r->end - r->first) / 2;
+    best->left = empty_box;
+    best->right = empty_box;
+    for (uint32_t k = r->first; k < r->end; ++k) {
+        box_grow(k < middle ? &best->left : &best->right, items[k].min, items[k].max);
+    }
+    return middle;
+}
+
+/* Order the items of a range of two or more and return where its right half begins. */
+static uint32_t split_range(umb_bvh_item *items, const range *r, choice *best)
+{
+    best->cost = INFINITY;
+    best->balance = 0;
+    if (r->end - r->first <= SWEEP_ITEMS) {
+        return split_by_sweep(items, r, best);
+    }
+    if (r->depth < HALVE_DEPTH) {
+        bins b;
+        fill_bins(&b, items, r);
+        for (int axis = 0; axis < 3; ++axis) {
+            if (b.scale[axis] > 0.0f) {
+                choose_bin(&b, axis, best);
+            }
+        }
+        if (best->balance > 0) {
+            return partition(&b, items, r, best);
+        }
+    }
+    return split_in_half(items, r, best);
+}
+
+/* ---- cutting into wide nodes ---------------------------------------------------------------- */
+
+static const float *cost_of(const build *b, uint32_t node)
+{
+    static const float item[8] = {0};
+    return node & UMB_BVH_ITEM ? item : b->splits[node].cost;
+}
+
+/* The cheapest cut of a subtree into j slots or fewer, from its halves' (Ylitie, Karras, Laine 2017,
+ * section 3.2): either some slots go left and the others right, or the subtree is a node of its own. */
+static void cut_split(const build *b, umb_bvh_split *s)
+{
+    const float *left = cost_of(b, s->left);
+    const float *right = cost_of(b, s->right);
+    for (int j = 2; j <= UMB_NODE_WIDTH; ++j) {
+        float best = INFINITY;
+        for (int k = 1; k < j; ++k) {
+            float cost = left[k] + right[j - k];
+            if (cost < best) {
+                best = cost;
+                s->pick[j] = (uint8_t)k;
+            }
+        }
+        if (j < UMB_NODE_WIDTH) {
+            s->cost[j] = best;
+        } else {
+            s->cost[1] = best + (float)(box_area(s->min, s->max) * b->inverse_root_area + b->node_cost);
+        }
+    }
+    s->pick[1] = 0;
+    for (int j = 2; j < UMB_NODE_WIDTH; ++j) {
+        if (s->cost[j - 1] <= s->cost[j]) {
+            s->cost[j] = s->cost[j - 1];
+            s->pick[j] = 0;
+        }
+    }
+}
+
+/* ---- recursion ------------------------------------------------------------------------------ */
+
+static uint32_t split_node(build *b, const range *r, range halves[2])
+{
+    choice best;
+    uint32_t middle = split_range(b->items, r, &best);
+    umb_bvh_split *s = &b->splits[middle];
+    memcpy(s->min, r->box.min, sizeof(s->min));
+    memcpy(s->max, r->box.max, sizeof(s->max));
+    range left = {r->first, middle, r->depth + 1, &s->left, best.left};
+    range right = {middle, r->end, r->depth + 1, &s->right, best.right};
+    halves[0] = left;
+    halves[1] = right;
+    *r->link = middle;
+    return middle;
+}
+
+static void split_all(build *b, const range *r)
+{
+    if (r->end - r->first == 1) {
+        *r->link = r->first | UMB_BVH_ITEM;
+        return;
+    }
+    range halves[2];
+    uint32_t node = split_node(b, r, halves);
+    split_all(b, &halves[0]);
+    split_all(b, &halves[1]);
+    cut_split(b, &b->splits[node]);
+}
+
+static void run_task(void *data, uint32_t i)
+{
+    build *b = data;
+    split_all(b, &b->tasks[i]);
+}
+
+/* Split large ranges here and gather the others as tasks. */
+static bool split_top(build *b, const range *r)
+{
+    if (r->end - r->first <= TASK_ITEMS) {
+        if (!umb_memory_reserve(b->allocator, (void **)&b->tasks, &b->task_capacity,
+                                (size_t)b->task_count + 1, sizeof(b->tasks[0]))) {
+            return false;
+        }
+        b->tasks[b->task_count++] = *r;
+        return true;
+    }
+    range halves[2];
+    split_node(b, r, halves);
+    return split_top(b, &halves[0]) && split_top(b, &halves[1]);
+}
+
+static void cut_top(build *b, uint32_t node, uint32_t first, uint32_t end)
+{
+    if (end - first > TASK_ITEMS) {
+        umb_bvh_split *s = &b->splits[node];
+        cut_top(b, s->left, first, node);
+        cut_top(b, s->right, node, end);
+        cut_split(b, s);
+    }
+}
+
+umb_result umb_bvh_split_items(const umb_allocator *a, const umb_tasks *tasks, umb_bvh_item *items,
+                               uint32_t count, umb_bvh_split *splits, uint32_t *root)
+{
+    build b = {.items = items, .splits = splits, .allocator = a, .node_cost = NODE_COST / count};
+    range all = {0, count, 0, root, empty_box};
+    for (uint32_t i = 0; i < count; ++i) {
+        box_grow(&all.box, items[i].min, items[i].max);
+    }
+    double area = box_area(all.box.min, all.box.max);
+    b.inverse_root_area = area > 0.0 ? 1.0 / area : 0.0;
+    umb_result result = UMB_ERROR_MEMORY;
+    if (split_top(&b, &all)) {
+        umb_tasks_run(tasks, run_task, &b, b.task_count);
+        cut_top(&b, *root, 0, count);
+        result = UMB_OK;
+    }
+    umb_memory_free(a, b.tasks, b.task_capacity * sizeof(b.tasks[0]));
+    return result;
+}

@@ -1,0 +1,283 @@
+/* Indices: creation by kind, and following the scene from commit to commit. */
+#include <string.h>
+
+#include "bvh.h"
+
+struct umb_index {
+    umb_tree tree;
+    umb_node *nodes; /* what tree.nodes points at */
+    umb_scene *scene;
+    umb_scene_listener listener;
+    umb_allocator allocator;
+    umb_tasks tasks;
+    umb_index_kind kind;
+    /* The state of the scene that the structure was built from: refitting needs all four unchanged. */
+    uint64_t structure;
+    uint32_t object_count, first_free_occluder, occluder_count;
+};
+
+/* ---- items ---------------------------------------------------------------------------------- */
+
+static uint32_t count_items(const umb_committed *c)
+{
+    uint32_t count = c->occluder_count - c->first_free_occluder;
+    for (uint32_t i = 0; i < c->object_count; ++i) {
+        count += c->objects[i].live ? 1u : 0u;
+    }
+    return count;
+}
+
+static void set_item(umb_bvh_item *item, const umb_aabb *box, uint32_t ref)
+{
+    for (int i = 0; i < 3; ++i) {
+        item->min[i] = box->min[i];
+        item->max[i] = box->max[i];
+    }
+    item->min[3] = 0.0f;
+    item->max[3] = 0.0f;
+    item->ref = ref;
+}
+
+/* Live objects by id, then stand-alone occluders. */
+static void gather_items(const umb_committed *c, umb_bvh_item *items)
+{
+    uint32_t n = 0;
+    for (uint32_t i = 0; i < c->object_count; ++i) {
+        if (c->objects[i].live) {
+            set_item(&items[n++], &c->objects[i].bounds, UMB_REF_OBJECT | i);
+        }
+    }
+    for (uint32_t i = c->first_free_occluder; i < c->occluder_count; ++i) {
+        set_item(&items[n++], &c->occluders[i].bounds, UMB_REF_OCCLUDER | i);
+    }
+}
+
+/* Rows of eight items in the order given; no hierarchy. */
+static umb_result build_flat(const umb_allocator *a, const umb_bvh_item *items, uint32_t count,
+                             umb_node **nodes, uint32_t *node_count)
+{
+    uint32_t rows = count / UMB_NODE_WIDTH + (count % UMB_NODE_WIDTH != 0);
+    umb_node *list = umb_memory_allocate_zero(a, rows, sizeof(umb_node));
+    if (list == NULL) {
+        return UMB_ERROR_MEMORY;
+    }
+    for (uint32_t k = 0; k < count; ++k) {
+        umb_node *node = &list[k / UMB_NODE_WIDTH];
+        uint32_t slot = node->count++;
+        for (int i = 0; i < 3; ++i) {
+            node->min[i][slot] = items[k].min[i];
+            node->max[i][slot] = items[k].max[i];
+        }
+        node->ref[slot] = items[k].ref;
+    }
+    for (uint32_t k = 0; k < rows; ++k) {
+        list[k].parent = UMB_NONE;
+        umb_node_pad(&list[k]);
+    }
+    *nodes = list;
+    *node_count = rows;
+    return UMB_OK;
+}
+
+/* ---- following the scene -------------------------------------------------------------------- */
+
+static umb_aabb bounds_of(const umb_node *nodes, uint32_t node_count, bool flat)
+{
+    umb_aabb all = {{0, 0, 0}, {0, 0, 0}};
+    uint32_t count = flat ? node_count : node_count < 1 ? 0 : 1;
+    for (uint32_t k = 0; k < count; ++k) {
+        umb_aabb b = umb_node_bounds(&nodes[k]);
+        for (int i = 0; i < 3; ++i) {
+            all.min[i] = k == 0 || b.min[i] < all.min[i] ? b.min[i] : all.min[i];
+            all.max[i] = k == 0 || b.max[i] > all.max[i] ? b.max[i] : all.max[i];
+        }
+    }
+    return all;
+}
+
+static void adopt(umb_index *index, const umb_committed *c, umb_node *nodes, uint32_t node_count,
+                  uint32_t item_count)
+{
+    umb_memory_free(&index->allocator, index->nodes, index->tree.node_count * sizeof(umb_node));
+    index->nodes = nodes;
+    index->tree.nodes = nodes;
+    index->tree.node_count = node_count;
+    index->tree.item_count = item_count;
+    index->structure = c->structure;
+    index->object_count = c->object_count;
+    index->first_free_occluder = c->first_free_occluder;
+    index->occluder_count = c->occluder_count;
+}
+
+static umb_result rebuild(umb_index *index, const umb_committed *c)
+{
+    if (c->object_count > UMB_REF_NUMBER || c->occluder_count > UMB_REF_NUMBER ||
+        (uint64_t)c->object_count + c->occluder_count > UMB_REF_NUMBER) {
+        return umb_scene_fail(index->scene, UMB_ERROR_LIMIT, "more than 2^30 objects and occluders");
+    }
+    uint32_t count = count_items(c);
+    umb_node *nodes = NULL;
+    uint32_t node_count = 0;
+    if (count > 0) {
+        const umb_allocator *a = &index->allocator;
+        umb_bvh_item *items = umb_memory_allocate(a, count * sizeof(items[0]));
+        umb_result result = UMB_ERROR_MEMORY;
+        if (items != NULL) {
+            gather_items(c, items);
+            result = index->tree.flat
+                         ? build_flat(a, items, count, &nodes, &node_count)
+                         : umb_bvh_build(a, &index->tasks, items, count, &nodes, &node_count);
+        }
+        umb_memory_free(a, items, count * sizeof(items[0]));
+        if (result != UMB_OK) {
+            return umb_scene_fail(index->scene, result, "no memory to index %u items", count);
+        }
+    }
+    adopt(index, c, nodes, node_count, count);
+    return UMB_OK;
+}
+
+static bool only_moved(const umb_index *index, const umb_committed *c)
+{
+    return index->structure == c->structure && index->object_count == c->object_count &&
+           index->first_free_occluder == c->first_free_occluder &&
+           index->occluder_count == c->occluder_count;
+}
+
+static umb_result update(void *user)
+{
+    umb_index *index = user;
+    const umb_committed *c = umb_scene_committed(index->scene);
+    if (index->tree.version == c->version) {
+        return UMB_OK;
+    }
+    if (only_moved(index, c)) {
+        umb_bvh_refit(index->nodes, index->tree.node_count, c);
+    } else {
+        umb_result result = rebuild(index, c);
+        if (result != UMB_OK) {
+            return result;
+        }
+    }
+    index->tree.bounds = bounds_of(index->nodes, index->tree.node_count, index->tree.flat);
+    index->tree.version = c->version;
+    return UMB_OK;
+}
+
+/* ---- public --------------------------------------------------------------------------------- */
+
+umb_result umb_index_create(umb_scene *scene, const umb_index_def *def, umb_index **out)
+{
+    static const umb_index_def defaults = {0};
+    def = def != NULL ? def : &defaults;
+    *out = NULL;
+    if (def->kind != UMB_INDEX_BVH && def->kind != UMB_INDEX_FLAT) {
+        return umb_scene_fail(scene, UMB_ERROR_ARGUMENT, "no index kind %d", (int)def->kind);
+    }
+    const umb_allocator *a = umb_scene_allocator(scene);
+    umb_index *index = umb_memory_allocate_zero(a, 1, sizeof(*index));
+    if (index == NULL) {
+        return umb_scene_fail(scene, UMB_ERROR_MEMORY, "no memory for an index");
+    }
+    const umb_committed *c = umb_scene_committed(scene);
+    index->scene = scene;
+    index->allocator = *a;
+    index->tasks = def->tasks;
+    index->kind = def->kind;
+    index->tree.flat = def->kind == UMB_INDEX_FLAT;
+    umb_result result = rebuild(index, c);
+    if (result != UMB_OK) {
+        umb_memory_free(a, index, sizeof(*index));
+        return result;
+    }
+    index->tree.bounds = bounds_of(index->nodes, index->tree.node_count, index->tree.flat);
+    index->tree.version = c->version;
+    index->listener.update = update;
+    index->listener.user = index;
+    umb_scene_listen(scene, &index->listener);
+    *out = index;
+    return UMB_OK;
+}
+
+void umb_index_destroy(umb_index *index)
+{
+    if (index != NULL) {
+        umb_allocator a = index->allocator;
+        umb_scene_unlisten(index->scene, &index->listener);
+        umb_memory_free(&a, index->nodes, index->tree.node_count * sizeof(umb_node));
+        umb_memory_free(&a, index, sizeof(*index));
+    }
+}
+
+static double half_area(const umb_aabb *b)
+{
+    double x = (double)b->max[0] - b->min[0];
+    double y = (double)b->max[1] - b->min[1];
+    double z = (double)b->max[2] - b->min[2];
+    return x * y + y * z + z * x;
+}
+
+/* A ray that meets the root meets a node in it with the ratio of their areas as probability, and then
+ * tests its boxes (Gummerus 3.2 on surface areas; Goldsmith and Salmon 1987). */
+static double tree_cost(const umb_tree *tree)
+{
+    if (tree->flat || tree->node_count == 0) {
+        return tree->item_count;
+    }
+    double root = half_area(&tree->bounds);
+    double cost = 0.0;
+    for (uint32_t k = 0; k < tree->node_count; ++k) {
+        umb_aabb b = umb_node_bounds(&tree->nodes[k]);
+        cost += (root > 0.0 ? half_area(&b) / root : 1.0) * tree->nodes[k].count;
+    }
+    return cost;
+}
+
+static uint32_t tree_depth(const umb_tree *tree)
+{
+    uint32_t deepest = tree->node_count > 0 ? 1 : 0;
+    for (uint32_t k = 1; k < tree->node_count && !tree->flat; ++k) {
+        uint32_t depth = 1;
+        for (uint32_t n = k; tree->nodes[n].parent != UMB_NONE; n = tree->nodes[n].parent) {
+            ++depth;
+        }
+        deepest = depth > deepest ? depth : deepest;
+    }
+    return deepest;
+}
+
+void umb_index_get_stats(const umb_index *index, umb_index_stats *out)
+{
+    const umb_tree *tree = &index->tree;
+    out->items = tree->item_count;
+    out->nodes = tree->node_count;
+    out->depth = tree_depth(tree);
+    out->cost = tree_cost(tree);
+    out->bytes = sizeof(*index) + tree->node_count * sizeof(umb_node);
+}
+
+const char *umb_index_kind_name(umb_index_kind kind)
+{
+    switch (kind) {
+    case UMB_INDEX_BVH:
+        return "bvh";
+    case UMB_INDEX_FLAT:
+        return "flat";
+    }
+    return "unknown";
+}
+
+const umb_tree *umb_index_tree(const umb_index *index)
+{
+    return &index->tree;
+}
+
+umb_scene *umb_index_scene(const umb_index *index)
+{
+    return index->scene;
+}
+
+umb_index_kind umb_index_get_kind(const umb_index *index)
+{
+    return index->kind;
+}
