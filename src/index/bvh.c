@@ -60,27 +60,29 @@ static uint32_t gather(const umb_bvh_split *splits, uint32_t node, int j, uint32
         return count + 1;
     }
     const umb_bvh_split *s = &splits[node];
-    while (j > 1 && s->pick[j] == 0) {
+    while (j > 1 && s->pick[j - 1] == 0) {
         --j;
     }
     if (j == 1) {
         slots[count] = node;
         return count + 1;
     }
-    count = gather(splits, s->left, s->pick[j], slots, count);
-    return gather(splits, s->right, j - s->pick[j], slots, count);
+    count = gather(splits, s->left, s->pick[j - 1], slots, count);
+    return gather(splits, s->right, j - s->pick[j - 1], slots, count);
 }
 
 /* The slots of the wide node at a subtree's root. */
-static uint32_t open_node(const umb_bvh_split *splits, uint32_t node, uint32_t slots[UMB_NODE_WIDTH])
+static uint32_t open_node(const umb_bvh_split *splits, uint32_t node,
+                          uint32_t slots[UMB_NODE_WIDTH])
 {
     if (node & UMB_BVH_ITEM) {
         slots[0] = node;
         return 1;
     }
     const umb_bvh_split *s = &splits[node];
-    uint32_t count = gather(splits, s->left, s->pick[UMB_NODE_WIDTH], slots, 0);
-    return gather(splits, s->right, UMB_NODE_WIDTH - s->pick[UMB_NODE_WIDTH], slots, count);
+    int left = s->pick[UMB_NODE_WIDTH - 1];
+    uint32_t count = gather(splits, s->left, left, slots, 0);
+    return gather(splits, s->right, UMB_NODE_WIDTH - left, slots, count);
 }
 
 static uint32_t count_nodes(const umb_bvh_split *splits, uint32_t node)
@@ -108,16 +110,18 @@ static void emit(emitter *e, uint32_t split, uint32_t number, uint32_t parent)
             const umb_bvh_item *item = &e->items[slots[i] & ~UMB_BVH_ITEM];
             set_slot(node, i, item->min, item->max, item->ref);
         } else {
-            const umb_bvh_split *s = &e->splits[slots[i]];
-            set_slot(node, i, s->min, s->max, UMB_REF_NODE | e->next++);
+            node->ref[i] = UMB_REF_NODE | e->next++;
+        }
+    }
+    for (uint32_t i = 0; i < node->count; ++i) {
+        if ((slots[i] & UMB_BVH_ITEM) == 0) {
+            uint32_t child = node->ref[i];
+            emit(e, slots[i], child, number);
+            umb_aabb box = umb_node_bounds(&e->nodes[child]);
+            set_slot(node, i, box.min, box.max, child);
         }
     }
     umb_node_pad(node);
-    for (uint32_t i = 0; i < node->count; ++i) {
-        if ((slots[i] & UMB_BVH_ITEM) == 0) {
-            emit(e, slots[i], node->ref[i] & UMB_REF_NUMBER, number);
-        }
-    }
 }
 
 umb_result umb_bvh_build(const umb_allocator *a, const umb_tasks *tasks, umb_bvh_item *items,

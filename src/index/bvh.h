@@ -30,10 +30,9 @@ umb_aabb umb_node_bounds(const umb_node *node);
 /* Split items into a binary tree; bvh_split.c. Node k of the tree splits its items between k - 1 and
  * k: every position is used once, so threads need no counter to number their nodes. */
 typedef struct umb_bvh_split {
-    float min[3], max[3];
     uint32_t left, right; /* a split, or an item with UMB_BVH_ITEM set */
-    float cost[8];        /* [j]: of this subtree in at most j slots of a wide node; [0] unused */
-    uint8_t pick[9];      /* [j]: how many of j slots go left; 0: as for j - 1. [8]: of its own node */
+    uint8_t pick[UMB_NODE_WIDTH]; /* [j - 1]: how many of j slots go left; 0: as for j - 1 slots, and
+                                     for one slot a node of its own, whose slots [7] deals out */
 } umb_bvh_split;
 
 #define UMB_BVH_ITEM 0x80000000u

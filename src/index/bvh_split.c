@@ -37,7 +37,7 @@ typedef struct build {
     umb_bvh_item *items;
     umb_bvh_split *splits;
     double inverse_root_area, node_cost;
-    range *tasks;
+    struct task *tasks;
     size_t task_capacity;
     uint32_t task_count;
     const umb_allocator *allocator;
@@ -271,79 +271,84 @@ static uint32_t split_range(umb_bvh_item *items, const range *r, choice *best)
 
 /* ---- cutting into wide nodes ---------------------------------------------------------------- */
 
-static const float *cost_of(const build *b, uint32_t node)
-{
-    static const float item[8] = {0};
-    return node & UMB_BVH_ITEM ? item : b->splits[node].cost;
-}
+/* The least cost of a subtree in at most j slots of a wide node; [0] is unused. All zero for an item. */
+typedef struct cut {
+    float cost[UMB_NODE_WIDTH];
+} cut;
 
 /* The cheapest cut of a subtree into j slots or fewer, from its halves' (Ylitie, Karras, Laine 2017,
  * section 3.2): either some slots go left and the others right, or the subtree is a node of its own. */
-static void cut_split(const build *b, umb_bvh_split *s)
+static cut cut_split(const build *b, umb_bvh_split *s, const box4 *box, const cut *left,
+                     const cut *right)
 {
-    const float *left = cost_of(b, s->left);
-    const float *right = cost_of(b, s->right);
+    cut c = {{0}};
     for (int j = 2; j <= UMB_NODE_WIDTH; ++j) {
         float best = INFINITY;
         for (int k = 1; k < j; ++k) {
-            float cost = left[k] + right[j - k];
+            float cost = left->cost[k] + right->cost[j - k];
             if (cost < best) {
                 best = cost;
-                s->pick[j] = (uint8_t)k;
+                s->pick[j - 1] = (uint8_t)k;
             }
         }
         if (j < UMB_NODE_WIDTH) {
-            s->cost[j] = best;
+            c.cost[j] = best;
         } else {
-            s->cost[1] = best + (float)(box_area(s->min, s->max) * b->inverse_root_area + b->node_cost);
+            double own = box_area(box->min, box->max) * b->inverse_root_area + b->node_cost;
+            c.cost[1] = best + (float)own;
         }
     }
-    s->pick[1] = 0;
+    s->pick[0] = 0;
     for (int j = 2; j < UMB_NODE_WIDTH; ++j) {
-        if (s->cost[j - 1] <= s->cost[j]) {
-            s->cost[j] = s->cost[j - 1];
-            s->pick[j] = 0;
+        if (c.cost[j - 1] <= c.cost[j]) {
+            c.cost[j] = c.cost[j - 1];
+            s->pick[j - 1] = 0;
         }
     }
+    return c;
 }
 
 /* ---- recursion ------------------------------------------------------------------------------ */
 
-static uint32_t split_node(build *b, const range *r, range halves[2])
+static umb_bvh_split *split_node(build *b, const range *r, range halves[2])
 {
     choice best;
     uint32_t middle = split_range(b->items, r, &best);
     umb_bvh_split *s = &b->splits[middle];
-    memcpy(s->min, r->box.min, sizeof(s->min));
-    memcpy(s->max, r->box.max, sizeof(s->max));
     range left = {r->first, middle, r->depth + 1, &s->left, best.left};
     range right = {middle, r->end, r->depth + 1, &s->right, best.right};
     halves[0] = left;
     halves[1] = right;
     *r->link = middle;
-    return middle;
+    return s;
 }
 
-static void split_all(build *b, const range *r)
+static cut split_all(build *b, const range *r)
 {
     if (r->end - r->first == 1) {
+        cut item = {{0}};
         *r->link = r->first | UMB_BVH_ITEM;
-        return;
+        return item;
     }
     range halves[2];
-    uint32_t node = split_node(b, r, halves);
-    split_all(b, &halves[0]);
-    split_all(b, &halves[1]);
-    cut_split(b, &b->splits[node]);
+    umb_bvh_split *s = split_node(b, r, halves);
+    cut left = split_all(b, &halves[0]);
+    cut right = split_all(b, &halves[1]);
+    return cut_split(b, s, &r->box, &left, &right);
 }
+
+typedef struct task {
+    range range;
+    cut cut;
+} task;
 
 static void run_task(void *data, uint32_t i)
 {
     build *b = data;
-    split_all(b, &b->tasks[i]);
+    b->tasks[i].cut = split_all(b, &b->tasks[i].range);
 }
 
-/* Split large ranges here and gather the others as tasks. */
+/* Split large ranges here and gather the others as tasks, from left to right. */
 static bool split_top(build *b, const range *r)
 {
     if (r->end - r->first <= TASK_ITEMS) {
@@ -351,7 +356,7 @@ static bool split_top(build *b, const range *r)
                                 (size_t)b->task_count + 1, sizeof(b->tasks[0]))) {
             return false;
         }
-        b->tasks[b->task_count++] = *r;
+        b->tasks[b->task_count++].range = *r;
         return true;
     }
     range halves[2];
@@ -359,14 +364,20 @@ static bool split_top(build *b, const range *r)
     return split_top(b, &halves[0]) && split_top(b, &halves[1]);
 }
 
-static void cut_top(build *b, uint32_t node, uint32_t first, uint32_t end)
+/* The cuts of the splits that split_top made, by the same walk; *next counts the tasks met. */
+static cut cut_top(build *b, uint32_t node, uint32_t first, uint32_t end, uint32_t *next, box4 *box)
 {
-    if (end - first > TASK_ITEMS) {
-        umb_bvh_split *s = &b->splits[node];
-        cut_top(b, s->left, first, node);
-        cut_top(b, s->right, node, end);
-        cut_split(b, s);
+    if (end - first <= TASK_ITEMS) {
+        const task *t = &b->tasks[(*next)++];
+        *box = t->range.box;
+        return t->cut;
     }
+    umb_bvh_split *s = &b->splits[node];
+    box4 right_box;
+    cut left = cut_top(b, s->left, first, node, next, box);
+    cut right = cut_top(b, s->right, node, end, next, &right_box);
+    box_grow(box, right_box.min, right_box.max);
+    return cut_split(b, s, box, &left, &right);
 }
 
 umb_result umb_bvh_split_items(const umb_allocator *a, const umb_tasks *tasks, umb_bvh_item *items,
@@ -381,8 +392,10 @@ umb_result umb_bvh_split_items(const umb_allocator *a, const umb_tasks *tasks, u
     b.inverse_root_area = area > 0.0 ? 1.0 / area : 0.0;
     umb_result result = UMB_ERROR_MEMORY;
     if (split_top(&b, &all)) {
+        uint32_t next = 0;
+        box4 box;
         umb_tasks_run(tasks, run_task, &b, b.task_count);
-        cut_top(&b, *root, 0, count);
+        cut_top(&b, *root, 0, count, &next, &box);
         result = UMB_OK;
     }
     umb_memory_free(a, b.tasks, b.task_capacity * sizeof(b.tasks[0]));
