@@ -21,6 +21,7 @@ typedef struct umb_object {
     const umb_mesh *mesh; /* NULL without a shape. Its parts refine the bounds */
     umb_transform transform;
     uint32_t occluder;    /* index of the occluder it owns, or UMB_NONE */
+    bool used;            /* the id is in use */
     bool live;            /* in use and not UMB_OBJECT_IGNORED */
     bool identity;
 } umb_object;
@@ -32,6 +33,8 @@ typedef struct umb_committed {
     uint32_t first_free_occluder;  /* occluders from here on have no owner */
     uint64_t version;              /* grows with every commit that changed something */
     uint64_t structure;            /* grows when items came or went, not when boxes moved */
+    const uint32_t *moved;         /* objects that this version moved; none when structure grew */
+    uint32_t moved_count;
 } umb_committed;
 
 const umb_committed *umb_scene_committed(const umb_scene *scene);
