@@ -307,10 +307,113 @@ static void test_city_path(void **state)
     model_free(m);
 }
 
+/* Boxes are rigid to within rounding, of the stated sizes, and keep out of the clearing. */
+static void test_boxfield(void **state)
+{
+    (void)state;
+    model *m = make("gen:boxfield,polygons=60k,seed=5");
+    assert_int_equal(m->object_count, 5000);
+    assert_int_equal(m->triangles, 60000);
+    double largest = 0;
+    for (uint32_t o = 0; o < m->object_count; ++o) {
+        const float(*t)[4] = m->objects[o].transform.m;
+        double centre = 0, diagonal = 0, side[3];
+        for (int j = 0; j < 3; ++j) {
+            int k = (j + 1) % 3;
+            side[j] = sqrt((double)t[0][j] * t[0][j] + (double)t[1][j] * t[1][j] +
+                           (double)t[2][j] * t[2][j]);
+            double dot = (double)t[0][j] * t[0][k] + (double)t[1][j] * t[1][k] + (double)t[2][j] * t[2][k];
+            assert_true(side[j] > 1.9999 && side[j] < 100.0001);
+            assert_true(fabs(dot) < 1e-2);
+            largest = fmax(largest, side[j]);
+            centre += (double)t[j][3] * t[j][3];
+            diagonal += side[j] * side[j];
+        }
+        assert_false(model_mirrored(&m->objects[o]));
+        assert_true(sqrt(centre) - sqrt(diagonal) / 2 > 99.99);
+    }
+    assert_true(largest > 99);
+    assert_solids(m, 0);
+    model_free(m);
+    camera_path p;
+    umb_error error;
+    assert_true(generate_path("gen:boxfield,polygons=60k,seed=5", &p, &error));
+    assert_int_equal(p.count, 64);
+    camera_path_free(&p);
+}
+
+/* The end of one wall piece is met by the pieces beside it: each corner of a panel's ends is a corner of
+ * another wall piece too. */
+static void test_building_walls_meet(void **state)
+{
+    (void)state;
+    model *m = make("gen:building,floors=2,rooms=12,seed=4");
+    uint32_t corners = 0;
+    assert_int_equal(m->triangles, count_triangles(m));
+    for (uint32_t o = 0; o < m->object_count; ++o) {
+        const model_object *wall = &m->objects[o];
+        if (!strstr(wall->name, " wall ")) {
+            continue;
+        }
+        int along = strstr(wall->name, "west") ? 2 : 0;
+        for (uint32_t v = 0; v < m->meshes[wall->mesh].position_count; ++v) {
+            float p[3], q[3];
+            bool met = false;
+            model_world_vertex(m, wall, v, p);
+            if (p[along] != wall->bounds.min[along] && p[along] != wall->bounds.max[along]) {
+                continue;
+            }
+            for (uint32_t k = 0; k < m->object_count && !met; ++k) {
+                const model_object *post = &m->objects[k];
+                for (uint32_t w = 0; strstr(post->name, " post") && w < 16 && !met; ++w) {
+                    model_world_vertex(m, post, w, q);
+                    met = memcmp(p, q, sizeof p) == 0;
+                }
+            }
+            assert_true(met);
+            ++corners;
+        }
+    }
+    assert_true(corners > 1000);
+    assert_solids(m, 0);
+    assert_int_equal(m->faults.non_manifold_edges, 0);
+    model_free(m);
+}
+
+/* No eye of the path is inside a solid. */
+static void test_building_path(void **state)
+{
+    (void)state;
+    camera_path p;
+    umb_error error;
+    model *m = make("gen:building,floors=3,rooms=60,seed=2");
+    assert_true(generate_path("gen:building,floors=3,rooms=60,seed=2", &p, &error));
+    assert_int_equal(p.count, 72);
+    for (uint32_t k = 0; k < p.count; ++k) {
+        bool indoors = true;
+        for (int i = 0; i < 3; ++i) {
+            indoors = indoors && p.rows[k][i] > m->bounds.min[i] && p.rows[k][i] < m->bounds.max[i];
+        }
+        assert_true(indoors);
+        for (uint32_t o = 0; o < m->object_count; ++o) {
+            const umb_aabb *b = &m->objects[o].bounds;
+            bool inside = true;
+            for (int i = 0; i < 3; ++i) {
+                inside = inside && p.rows[k][i] >= b->min[i] && p.rows[k][i] <= b->max[i];
+            }
+            assert_false(inside);
+        }
+    }
+    camera_path_free(&p);
+    model_free(m);
+}
+
 static void test_determinism(void **state)
 {
     (void)state;
     assert_true(hash_spec("gen:city,triangles=50k,seed=7") == UINT64_C(0x25f6284dd9b67099));
+    assert_true(hash_spec("gen:boxfield,polygons=20k") == UINT64_C(0x9eddb427f6546bed));
+    assert_true(hash_spec("gen:building") == UINT64_C(0x308e5f275936a6d));
     assert_true(hash_spec("gen:city,triangles=50k,seed=8") != hash_spec("gen:city,triangles=50k,seed=7"));
 }
 
@@ -344,7 +447,9 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_blocks_recipe), cmocka_unit_test(test_blocks_path),
         cmocka_unit_test(test_city_floors_meet), cmocka_unit_test(test_city_counts),
-        cmocka_unit_test(test_city_path),     cmocka_unit_test(test_determinism),
+        cmocka_unit_test(test_city_path),     cmocka_unit_test(test_boxfield),
+        cmocka_unit_test(test_building_walls_meet), cmocka_unit_test(test_building_path),
+        cmocka_unit_test(test_determinism),
         cmocka_unit_test(test_bad_specs),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -7,7 +7,8 @@
 #include "generate_parts.h"
 #include "model_parts.h"
 
-static const generate_kind *const kinds[] = {&generate_blocks, &generate_city};
+static const generate_kind *const kinds[] = {&generate_blocks, &generate_city, &generate_boxfield,
+                                            &generate_building};
 enum { KIND_COUNT = sizeof kinds / sizeof kinds[0] };
 
 /* What a spec says, ready to be run. */
