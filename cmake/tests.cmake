@@ -17,13 +17,20 @@ function(umb_add_test name label)
                        ENVIRONMENT "${UMB_TEST_ENVIRONMENT}")
 endfunction()
 
+# tests/support: what several tests share, and the soak run too.
+file(GLOB UMB_SUPPORT_SOURCES CONFIGURE_DEPENDS tests/support/*.c)
+add_library(umb_test_support STATIC ${UMB_SUPPORT_SOURCES})
+target_include_directories(umb_test_support PUBLIC tests PRIVATE src)
+target_link_libraries(umb_test_support PUBLIC ${UMB_INSIDE})
+
 # tests/test_NAME.c is one program. They may look inside src/ and tools/.
 file(GLOB UMB_TEST_SOURCES CONFIGURE_DEPENDS tests/test_*.c)
 foreach(source ${UMB_TEST_SOURCES})
   get_filename_component(name ${source} NAME_WE)
   add_executable(${name} ${source})
   target_include_directories(${name} PRIVATE src tools tests)
-  target_link_libraries(${name} PRIVATE ${UMB_INSIDE} PkgConfig::CMOCKA PkgConfig::JANSSON m)
+  target_link_libraries(${name} PRIVATE umb_test_support ${UMB_INSIDE} PkgConfig::CMOCKA
+                        PkgConfig::JANSSON m)
   umb_add_test(${name} unit ${name})
 endforeach()
 

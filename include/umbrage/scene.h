@@ -49,7 +49,9 @@ typedef uint32_t umb_shape;
 enum {
     UMB_OBJECT_STATIC = 1u << 0,  /* will not move: umb_scene_weld() may join it with its neighbours */
     UMB_OBJECT_NEVER_HIDES = 1u << 1, /* its shape is no occluder (an animated mesh, a detail) */
-    UMB_OBJECT_IGNORED = 1u << 2  /* neither answered nor an occluder, until the flag is cleared */
+    UMB_OBJECT_IGNORED = 1u << 2, /* neither answered nor an occluder, until the flag is cleared */
+    UMB_OBJECT_IS_SHAPE = 1u << 3 /* nothing is drawn for it but its shape: the boxes of the shape's parts
+                                     may be tested in place of its bounds, which hides more */
 };
 
 /* One thing that is culled or kept as a whole. */

@@ -9,7 +9,8 @@
 #include "scene_state.h"
 
 #define MAX_ITEMS (1u << 30) /* an index keeps two bits of an item's number for itself */
-#define OBJECT_FLAGS (UMB_OBJECT_STATIC | UMB_OBJECT_NEVER_HIDES | UMB_OBJECT_IGNORED)
+#define OBJECT_FLAGS \
+    (UMB_OBJECT_STATIC | UMB_OBJECT_NEVER_HIDES | UMB_OBJECT_IGNORED | UMB_OBJECT_IS_SHAPE)
 
 umb_result umb_scene_fail(const umb_scene *scene, umb_result code, const char *format, ...)
 {

@@ -24,6 +24,7 @@ typedef struct umb_object {
     bool used;            /* the id is in use */
     bool live;            /* in use and not UMB_OBJECT_IGNORED */
     bool identity;
+    bool refine;          /* UMB_OBJECT_IS_SHAPE: the mesh's parts say where it is */
 } umb_object;
 
 typedef struct umb_committed {

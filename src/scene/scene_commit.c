@@ -37,6 +37,7 @@ static umb_object make_object(const umb_scene *scene, const umb_object_slot *slo
         o.used = true;
         o.live = (slot->flags & UMB_OBJECT_IGNORED) == 0;
         o.identity = slot->placement.identity;
+        o.refine = o.mesh != NULL && (slot->flags & UMB_OBJECT_IS_SHAPE) != 0;
     }
     return o;
 }

@@ -38,7 +38,7 @@ static umb_result add_objects(umb_scene *scene, const model *m, const umb_shape 
 {
     for (uint32_t i = 0; i < m->object_count; ++i) {
         const model_object *o = &m->objects[i];
-        umb_object_def def = {.bounds = o->bounds, .transform = o->transform, .flags = UMB_OBJECT_STATIC};
+        umb_object_def def = {.bounds = o->bounds, .transform = o->transform, .flags = UMB_OBJECT_STATIC | UMB_OBJECT_IS_SHAPE};
         if (o->mesh != MODEL_NONE) {
             def.shape = shapes[o->mesh];
         }

@@ -1,0 +1,12 @@
+/* What capture reads of a culler. */
+#ifndef UMB_CULLER_H
+#define UMB_CULLER_H
+
+#include "umbrage/cull.h"
+
+const umb_index *umb_culler_index(const umb_culler *culler);
+umb_culler_def umb_culler_settings(const umb_culler *culler);
+/* The view and answer of the last umb_cull; NULL before the first. */
+const umb_view *umb_culler_last_view(const umb_culler *culler, const uint32_t **ids, uint32_t *count);
+
+#endif

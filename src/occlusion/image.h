@@ -1,0 +1,22 @@
+/* Outer images of boxes: the pixels that a box may touch and the nearness of its nearest point. */
+#ifndef UMB_IMAGE_H
+#define UMB_IMAGE_H
+
+#include "method.h"
+
+/* Bounds of an image in raster coordinates and of its depth; outer, errors included. */
+typedef struct umb_image_bounds {
+    double x_min, y_min, x_max, y_max;
+    double w_min;
+} umb_image_bounds;
+
+/* Pixels whose closed squares cover those bounds as far as they are on the raster. A point on a pixel's
+ * border needs only one of the pixels that it touches. */
+umb_image umb_image_of_bounds(const umb_raster_map *map, const umb_image_bounds *b);
+
+/* Image of a shape's box under a transform, as the box it is, turned; false if some of it may be nearer
+ * than the near depth. The transform moves each vertex by one rounding to float; identity: by none. */
+bool umb_image_of_part(const umb_raster_map *map, const umb_aabb *part, const umb_transform *transform,
+                       bool identity, umb_image_bounds *out);
+
+#endif

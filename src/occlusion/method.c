@@ -1,0 +1,30 @@
+#include "method.h"
+
+const umb_method_ops *umb_method_get(umb_method method)
+{
+    return method == UMB_METHOD_RASTER ? &umb_raster_method : NULL;
+}
+
+const char *umb_method_name(umb_method method)
+{
+    switch (method) {
+    case UMB_METHOD_RASTER:
+        return "raster";
+    case UMB_METHOD_NONE:
+        return "none";
+    }
+    return "unknown";
+}
+
+const char *umb_class_name(umb_class class_)
+{
+    switch (class_) {
+    case UMB_CLASS_STRICT:
+        return "strict";
+    case UMB_CLASS_PIXEL:
+        return "pixel";
+    case UMB_CLASS_APPROXIMATE:
+        return "approximate";
+    }
+    return "unknown";
+}

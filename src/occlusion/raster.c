@@ -1,0 +1,259 @@
+/* The strict silhouette raster, after the incremental occlusion maps of Gummerus 5.5: each occluder's
+ * silhouette is filled into a window of its own, its depth bounded a sub-tile at a time, and the result
+ * merged into one buffer of covered pixels. docs/conservative.md proves that nothing seen is hidden. */
+#include <string.h>
+
+#include "base/memory.h"
+#include "fill.h"
+#include "method.h"
+#include "silhouette.h"
+
+/* One tile of the occluder being drawn. */
+typedef struct window_tile {
+    uint32_t mask[UMB_TILE_HEIGHT];
+    float z[8];
+} window_tile;
+
+typedef struct raster {
+    umb_allocator allocator;
+    umb_raster_map map;
+    const umb_committed *scene;
+    uint64_t structure; /* of the scene that the scratch was sized for; 0: none */
+    umb_coverage coverage;
+    umb_fill fill;
+    umb_silhouette silhouette;
+    window_tile *window; /* one per tile of the buffer; masks all zero between draws */
+    uint8_t *wanted;     /* per tile: the occluder covers pixels that were open or farther */
+    uint32_t *row;       /* one row of covered words */
+    size_t window_capacity, wanted_capacity, row_capacity;
+} raster;
+
+static umb_result create(const umb_allocator *allocator, void **state)
+{
+    raster *r = umb_memory_allocate_zero(allocator, 1, sizeof *r);
+    if (r == NULL) {
+        return UMB_ERROR_MEMORY;
+    }
+    r->allocator = *allocator;
+    *state = r;
+    return UMB_OK;
+}
+
+static void destroy(void *state)
+{
+    raster *r = state;
+    umb_allocator a = r->allocator;
+    umb_coverage_free(&r->coverage, &a);
+    umb_fill_free(&r->fill, &a);
+    umb_silhouette_free(&r->silhouette, &a);
+    umb_memory_free(&a, r->window, r->window_capacity * sizeof *r->window);
+    umb_memory_free(&a, r->wanted, r->wanted_capacity);
+    umb_memory_free(&a, r->row, r->row_capacity * sizeof *r->row);
+    umb_memory_free(&a, r, sizeof *r);
+}
+
+static bool reserve_window(raster *r)
+{
+    size_t tiles = (size_t)r->coverage.columns * r->coverage.rows;
+    size_t before = r->window_capacity;
+    if (!umb_memory_reserve(&r->allocator, (void **)&r->window, &r->window_capacity, tiles,
+                            sizeof *r->window)) {
+        return false;
+    }
+    memset(r->window + before, 0, (r->window_capacity - before) * sizeof *r->window);
+    return umb_memory_reserve(&r->allocator, (void **)&r->wanted, &r->wanted_capacity, tiles, 1) &&
+           umb_memory_reserve(&r->allocator, (void **)&r->row, &r->row_capacity, r->coverage.columns,
+                              sizeof *r->row);
+}
+
+static bool reserve_silhouette(raster *r, const umb_committed *scene)
+{
+    if (r->structure == scene->structure + 1) {
+        return true;
+    }
+    uint32_t vertices = 0, triangles = 0, edges = 0;
+    for (uint32_t i = 0; i < scene->occluder_count; ++i) {
+        const umb_mesh *m = scene->occluders[i].mesh;
+        vertices = m->position_count > vertices ? m->position_count : vertices;
+        triangles = m->triangle_count > triangles ? m->triangle_count : triangles;
+        edges = m->edge_count > edges ? m->edge_count : edges;
+    }
+    if (!umb_silhouette_reserve(&r->silhouette, &r->allocator, vertices, triangles, edges)) {
+        return false;
+    }
+    r->structure = scene->structure + 1;
+    return true;
+}
+
+static umb_result prepare(void *state, const umb_raster_map *map, const umb_committed *scene)
+{
+    raster *r = state;
+    r->map = *map;
+    r->scene = scene;
+    if (!umb_coverage_resize(&r->coverage, &r->allocator, map->width, map->height) ||
+        !umb_fill_resize(&r->fill, &r->allocator, map->width, map->height) || !reserve_window(r) ||
+        !reserve_silhouette(r, scene)) {
+        return UMB_ERROR_MEMORY;
+    }
+    umb_coverage_clear(&r->coverage);
+    return UMB_OK;
+}
+
+static void submit(const void *state, const umb_query *queries, uint32_t count, umb_verdict *verdicts)
+{
+    const raster *r = state;
+    for (uint32_t i = 0; i < count; ++i) {
+        const umb_image *image = &queries[i].image;
+        bool hidden = image->rect.x0 > image->rect.x1 ||
+                      umb_coverage_hides(&r->coverage, image->rect, image->nearness);
+        verdicts[i] = hidden ? UMB_VERDICT_HIDDEN : UMB_VERDICT_VISIBLE;
+    }
+}
+
+/* Pixels and tiles of the silhouette's box. */
+typedef struct window {
+    uint32_t x0, y0, x1, y1;
+    uint32_t tx0, ty0, tx1, ty1;
+} window;
+
+static uint32_t clamp_pixel(double v, uint32_t size)
+{
+    return v < 0.0 ? 0 : v >= size ? size - 1 : (uint32_t)v;
+}
+
+static window window_of(const raster *r, double x_min, double y_min, double x_max, double y_max)
+{
+    window w;
+    w.x0 = clamp_pixel(x_min, r->map.width);
+    w.y0 = clamp_pixel(y_min, r->map.height);
+    w.x1 = clamp_pixel(x_max, r->map.width);
+    w.y1 = clamp_pixel(y_max, r->map.height);
+    w.tx0 = w.x0 / UMB_TILE_WIDTH;
+    w.ty0 = w.y0 / UMB_TILE_HEIGHT;
+    w.tx1 = w.x1 / UMB_TILE_WIDTH;
+    w.ty1 = w.y1 / UMB_TILE_HEIGHT;
+    return w;
+}
+
+/* Rows of covered pixels into tiles; clamped pixels beyond the raster's right border are cut off. */
+static void gather_tiles(raster *r, const window *w)
+{
+    uint32_t last = r->map.width - 1;
+    uint32_t last_mask = ~0u >> (31 - last % 32);
+    for (uint32_t y = w->y0; y <= w->y1; ++y) {
+        umb_fill_row(&r->fill, y, r->row);
+        if (w->tx1 == last / 32) {
+            r->row[w->tx1] &= last_mask;
+        }
+        window_tile *tiles = r->window + (size_t)(y / UMB_TILE_HEIGHT) * r->coverage.columns;
+        for (uint32_t tx = w->tx0; tx <= w->tx1; ++tx) {
+            tiles[tx].mask[y % UMB_TILE_HEIGHT] = r->row[tx];
+        }
+    }
+}
+
+/* A tile is wanted when the occluder covers something there. Its depth starts as "nearest" and each
+ * triangle that may reach the tile lowers it. */
+static bool want_tiles(raster *r, const window *w)
+{
+    bool any = false;
+    for (uint32_t ty = w->ty0; ty <= w->ty1; ++ty) {
+        for (uint32_t tx = w->tx0; tx <= w->tx1; ++tx) {
+            size_t t = (size_t)ty * r->coverage.columns + tx;
+            window_tile *tile = &r->window[t];
+            uint32_t bits = 0;
+            for (uint32_t i = 0; i < UMB_TILE_HEIGHT; ++i) {
+                bits |= tile->mask[i];
+            }
+            r->wanted[t] = bits != 0;
+            any |= bits != 0;
+            for (uint32_t s = 0; s < 8; ++s) {
+                tile->z[s] = INFINITY;
+            }
+        }
+    }
+    return any;
+}
+
+/* Least nearness of a triangle over a sub-tile: its plane at the corner where it is farthest, or its
+ * farthest vertex where that is nearer. The loss of 2^-21 covers the plane's 2^-22 and the float. */
+static float farthest_in(const umb_depth_triangle *t, double x, double y)
+{
+    double gx = t->gx < 0.0 ? t->gx * 8.0 : 0.0, gy = t->gy < 0.0 ? t->gy * 4.0 : 0.0;
+    double z = t->g0 + (t->gx * x + gx) + (t->gy * y + gy);
+    z = z > t->least ? z : t->least;
+    return (float)(z - 0x1p-21 * fabs(z));
+}
+
+static void lower_tile(window_tile *tile, const umb_depth_triangle *t, uint32_t tx, uint32_t ty)
+{
+    for (uint32_t s = 0; s < 8; ++s) {
+        double x = tx * UMB_TILE_WIDTH + 8.0 * (s % 4), y = ty * UMB_TILE_HEIGHT + 4.0 * (s / 4);
+        bool beside = t->x_max < x || t->x_min > x + 8.0 || t->y_max < y || t->y_min > y + 4.0;
+        float z = farthest_in(t, x, y);
+        tile->z[s] = beside || z >= tile->z[s] ? tile->z[s] : z;
+    }
+}
+
+static void bound_depth(raster *r, const window *w)
+{
+    const umb_silhouette *s = &r->silhouette;
+    for (uint32_t i = 0; i < s->triangle_count; ++i) {
+        const umb_depth_triangle *t = &s->triangles[i];
+        window v = window_of(r, t->x_min, t->y_min, t->x_max, t->y_max);
+        uint32_t tx1 = v.tx1 < w->tx1 ? v.tx1 : w->tx1, ty1 = v.ty1 < w->ty1 ? v.ty1 : w->ty1;
+        for (uint32_t ty = v.ty0 > w->ty0 ? v.ty0 : w->ty0; ty <= ty1; ++ty) {
+            for (uint32_t tx = v.tx0 > w->tx0 ? v.tx0 : w->tx0; tx <= tx1; ++tx) {
+                size_t tile = (size_t)ty * r->coverage.columns + tx;
+                if (r->wanted[tile] != 0) {
+                    lower_tile(&r->window[tile], t, tx, ty);
+                }
+            }
+        }
+    }
+}
+
+static void merge_tiles(raster *r, const window *w)
+{
+    for (uint32_t ty = w->ty0; ty <= w->ty1; ++ty) {
+        for (uint32_t tx = w->tx0; tx <= w->tx1; ++tx) {
+            uint32_t t = ty * r->coverage.columns + tx;
+            if (r->wanted[t] != 0) {
+                umb_coverage_merge(&r->coverage, t, r->window[t].mask, r->window[t].z);
+                memset(r->window[t].mask, 0, sizeof r->window[t].mask);
+            }
+        }
+    }
+}
+
+static bool occlude(void *state, uint32_t occluder, umb_cull_stats *stats)
+{
+    raster *r = state;
+    umb_silhouette *s = &r->silhouette;
+    if (!umb_silhouette_find(s, &r->map, &r->scene->occluders[occluder])) {
+        return false;
+    }
+    window w = window_of(r, s->x_min, s->y_min, s->x_max, s->y_max);
+    umb_fill_begin(&r->fill, w.x0, w.y0, w.x1, w.y1);
+    for (uint32_t i = 0; i < s->edge_count; ++i) {
+        umb_fill_edge(&r->fill, &s->edges[i]);
+    }
+    gather_tiles(r, &w);
+    stats->occluders += 1;
+    stats->edges += s->edge_count;
+    if (!want_tiles(r, &w)) {
+        return false;
+    }
+    bound_depth(r, &w);
+    merge_tiles(r, &w);
+    return true;
+}
+
+static const umb_coverage *buffer(const void *state)
+{
+    return &((const raster *)state)->coverage;
+}
+
+const umb_method_ops umb_raster_method = {
+    "raster", UMB_CLASS_STRICT, create, destroy, prepare, submit, occlude, buffer,
+};

@@ -1,0 +1,170 @@
+/* The buffer's invariant, by brute force: every point of a covered pixel is blocked by a triangle of an
+ * occluder, beyond the near depth, nearer than the bound of its sub-tile. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "occlusion/method.h"
+#include "occlusion/raster_map.h"
+#include "scene/scene.h"
+#include "support/micro_scenes.h"
+
+typedef struct point {
+    long double x, y, z;
+} point;
+
+static point minus(point a, point b)
+{
+    point r = {a.x - b.x, a.y - b.y, a.z - b.z};
+    return r;
+}
+
+static long double dot(point a, point b)
+{
+    return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+
+static point cross(point a, point b)
+{
+    point r = {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+    return r;
+}
+
+static point from_vec(umb_vec3 v)
+{
+    point p = {v.x, v.y, v.z};
+    return p;
+}
+
+/* View depth at which the line from, along, meets the front of a triangle; false if it does not. along
+ * gains 1 of view depth per unit. */
+static bool meets(point from, point along, const point t[3], bool two_sided, long double *depth)
+{
+    point n = cross(minus(t[1], t[0]), minus(t[2], t[0]));
+    long double facing = dot(n, along);
+    if (facing == 0 || (facing > 0 && !two_sided)) {
+        return false;
+    }
+    long double s = dot(n, minus(t[0], from)) / facing;
+    point hit = {from.x + s * along.x, from.y + s * along.y, from.z + s * along.z};
+    for (int i = 0; i < 3; ++i) {
+        point side = cross(minus(t[(i + 1) % 3], t[i]), minus(hit, t[i]));
+        if (dot(side, n) < 0) {
+            return false;
+        }
+    }
+    *depth = s;
+    return true;
+}
+
+/* Nearest blocking depth beyond near along the line through a raster point; INFINITY if none. */
+static long double blocked_at(const umb_raster_map *map, const model *m, long double px, long double py)
+{
+    point along, from = from_vec(map->eye), ray_x = from_vec(map->ray_x), ray_y = from_vec(map->ray_y);
+    point ray = from_vec(map->ray_0);
+    ray.x += px * ray_x.x + py * ray_y.x;
+    ray.y += px * ray_x.y + py * ray_y.y;
+    ray.z += px * ray_x.z + py * ray_y.z;
+    along = ray;
+    if (map->orthographic) {
+        from.x += ray.x;
+        from.y += ray.y;
+        from.z += ray.z;
+        along = from_vec(map->ray_w);
+    }
+    long double nearest = INFINITY;
+    for (uint32_t i = 0; i < m->object_count; ++i) {
+        const model_object *o = &m->objects[i];
+        const model_mesh *mesh = &m->meshes[o->mesh];
+        for (uint32_t k = 0; k < mesh->triangle_count; ++k) {
+            point t[3];
+            for (int c = 0; c < 3; ++c) {
+                float v[3];
+                model_world_vertex(m, o, mesh->indices[3 * k + (uint32_t)c], v);
+                int at = model_mirrored(o) ? 2 - c : c;
+                t[at] = (point){v[0], v[1], v[2]};
+            }
+            long double depth;
+            if ((mesh->flags[k] & UMB_TRIANGLE_OPEN) == 0 &&
+                meets(from, along, t, (mesh->flags[k] & UMB_TRIANGLE_TWO_SIDED) != 0, &depth) &&
+                depth >= map->near_depth && depth < nearest) {
+                nearest = depth;
+            }
+        }
+    }
+    return nearest;
+}
+
+static double unit(uint64_t *state)
+{
+    *state = *state * 6364136223846793005u + 1442695040888963407u;
+    return (double)(*state >> 11) * 0x1p-53;
+}
+
+static uint64_t check_buffer(const umb_raster_map *map, const umb_coverage *b, const model *m, uint64_t seed)
+{
+    uint64_t covered = 0;
+    for (uint32_t y = 0; y < map->height; ++y) {
+        for (uint32_t x = 0; x < map->width; ++x) {
+            const umb_tile *t = &b->tiles[y / 8 * b->columns + x / 32];
+            if ((t->mask[y % 8] >> (x % 32) & 1u) == 0) {
+                continue;
+            }
+            covered += 1;
+            double corner_x = unit(&seed), corner_y = unit(&seed);
+            double fx = corner_x < 0.3 ? 1e-6 : corner_x > 0.7 ? 1 - 1e-6 : corner_x;
+            double fy = corner_y < 0.3 ? 1e-6 : corner_y > 0.7 ? 1 - 1e-6 : corner_y;
+            long double depth = blocked_at(map, m, x + fx, y + fy);
+            long double z = t->z[4 * (y % 8 / 4) + x % 32 / 8];
+            bool ok = map->orthographic ? -depth > z : 1.0L / depth > z;
+            if (depth == INFINITY || !ok) {
+                fail_msg("seed %llu pixel %u,%u: depth %Lg, bound %Lg", (unsigned long long)seed, x, y, depth, z);
+            }
+        }
+    }
+    return covered;
+}
+
+static void test_invariant(void **state)
+{
+    (void)state;
+    const char *size = getenv("UMBRAGE_TEST_SIZE");
+    uint32_t scenes = size != NULL && size[0] == 's' ? 30 : 120;
+    uint64_t covered = 0;
+    for (uint32_t i = 0; i < scenes; ++i) {
+        micro_scene micro;
+        assert_true(micro_scene_make(i + 1000, &micro));
+        umb_error error;
+        umb_tasks tasks = {0};
+        umb_scene *scene = model_scene(micro.model, micro.weld, tasks, NULL, &error);
+        assert_non_null(scene);
+        micro.view.buffer_width = 70;
+        micro.view.buffer_height = 45;
+        umb_raster_map map;
+        umb_raster_map_prepare(&map, &micro.view);
+        const umb_committed *committed = umb_scene_committed(scene);
+        void *raster;
+        umb_cull_stats stats = {0};
+        assert_int_equal(umb_raster_method.create(umb_scene_allocator(scene), &raster), UMB_OK);
+        assert_int_equal(umb_raster_method.prepare(raster, &map, committed), UMB_OK);
+        for (uint32_t k = 0; k < committed->occluder_count; ++k) {
+            (void)umb_raster_method.occlude(raster, k, &stats);
+        }
+        covered += check_buffer(&map, umb_raster_method.buffer(raster), micro.model, i);
+        umb_raster_method.destroy(raster);
+        umb_scene_destroy(scene);
+        micro_scene_free(&micro);
+    }
+    printf("# %llu covered pixels checked\n", (unsigned long long)covered);
+    assert_true(covered > scenes * 100u);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_invariant)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
