@@ -1,0 +1,304 @@
+/* Exact confirmation of a sight-line.
+ *
+ * The line is the one through the eye and a given double point (orthographic: through the point, along
+ * forward), and nothing about it is rounded: which of the object's triangles it crosses, whether that
+ * is inside the view, and which triangles it touches before, are signs of exact sums. Boxes of objects
+ * are passed over in double, with room for its rounding; that can only add triangles to look at.
+ *
+ * Wherever a case is left open (a line in a blocker's plane, a number too long) the answer is "not
+ * confirmed": a confirmed line is free under every reading of the definition.
+ */
+#include <math.h>
+#include <string.h>
+
+#include "exact.h"
+#include "oracle.h"
+
+#define NEARBY_LINES 28
+
+/* value(s) = base + s * slope along the line. */
+typedef struct linear {
+    exact base, slope;
+} linear;
+
+typedef struct confirmation {
+    const truth *t;
+    const oracle_view *v;
+    const double *through;
+    exact_line line;
+    oracle_sight sight;
+    linear beyond_near;
+    exact_crossing target;
+    uint8_t renderer;
+    bool lost;
+} confirmation;
+
+static bool in_range3(const double p[3])
+{
+    return exact_in_range(p[0]) && exact_in_range(p[1]) && exact_in_range(p[2]);
+}
+
+static bool view_in_range(const umb_view *view)
+{
+    bool ok = in_range3(view->eye) && in_range3(view->right) && in_range3(view->up) &&
+              in_range3(view->forward) && exact_in_range(view->x_min) &&
+              exact_in_range(view->x_max) && exact_in_range(view->y_min) &&
+              exact_in_range(view->y_max) && exact_in_range(view->near_depth) &&
+              (isinf(view->far_depth) || exact_in_range(view->far_depth));
+    for (uint32_t i = 0; i < view->plane_count; ++i) {
+        ok = ok && in_range3(view->planes[i]) && exact_in_range(view->planes[i][3]);
+    }
+    return ok;
+}
+
+/* (X(s) - from).k - limit; from NULL: zero. */
+static void make_linear(const exact_line *line, const double from[3], const double k[3],
+                        double limit, linear *out)
+{
+    exact at_origin, l;
+    exact_dot(line->origin, from, k, &at_origin);
+    exact_set(&l, limit);
+    exact_subtract(&out->base, &at_origin, &l);
+    exact_direction_dot(line, k, &out->slope);
+}
+
+static int linear_sign(confirmation *c, const linear *f, const exact_crossing *at)
+{
+    return exact_along_sign(at, &f->base, &f->slope, &c->lost);
+}
+
+/* Sign of (X - eye).axis - limit * (perspective: (X - eye).forward) at a crossing in front of the eye. */
+static int side_sign(confirmation *c, const double axis[3], double limit, const exact_crossing *at)
+{
+    const umb_view *view = c->v->view;
+    linear f;
+    if (view->projection == UMB_ORTHOGRAPHIC) {
+        make_linear(&c->line, view->eye, axis, limit, &f);
+        return linear_sign(c, &f, at);
+    }
+    exact across, along, l, scaled, difference;
+    exact_direction_dot(&c->line, axis, &across);
+    exact_direction_dot(&c->line, view->forward, &along);
+    exact_set(&l, limit);
+    exact_multiply(&scaled, &along, &l);
+    exact_subtract(&difference, &across, &scaled);
+    return exact_sign(&difference, &c->lost);
+}
+
+static bool in_view(confirmation *c, const exact_crossing *at)
+{
+    const umb_view *view = c->v->view;
+    linear f;
+    if (linear_sign(c, &c->beyond_near, at) < 0) {
+        return false;
+    }
+    if (!isinf(view->far_depth)) {
+        make_linear(&c->line, view->eye, view->forward, view->far_depth, &f);
+        if (linear_sign(c, &f, at) > 0) {
+            return false;
+        }
+    }
+    for (uint32_t i = 0; i < view->plane_count; ++i) {
+        make_linear(&c->line, NULL, view->planes[i], -view->planes[i][3], &f);
+        if (linear_sign(c, &f, at) < 0) {
+            return false;
+        }
+    }
+    return side_sign(c, view->right, view->x_min, at) >= 0 &&
+           side_sign(c, view->right, view->x_max, at) <= 0 &&
+           side_sign(c, view->up, view->y_min, at) >= 0 &&
+           side_sign(c, view->up, view->y_max, at) <= 0;
+}
+
+static bool is_corner(const confirmation *c, float v[3][3])
+{
+    for (int i = 0; i < 3; ++i) {
+        if (v[i][0] == c->through[0] && v[i][1] == c->through[1] && v[i][2] == c->through[2]) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Where the line meets a triangle of the object: a crossing, or, edge-on and without area, a corner that
+ * the line was drawn through. */
+static bool reach(confirmation *c, float v[3][3], exact_crossing *at)
+{
+    exact_meeting meeting = exact_line_triangle(&c->line, v, at, &c->lost);
+    if (meeting == EXACT_IN_PLANE && is_corner(c, v)) {
+        bool perspective = c->v->view->projection == UMB_PERSPECTIVE;
+        exact_set(&at->numerator, perspective ? 1.0 : 0.0);
+        exact_set(&at->denominator, 1.0);
+        at->facing = 0;
+        return true;
+    }
+    return meeting == EXACT_CROSS;
+}
+
+/* The nearest point of the object on the line that the renderer shows and the view holds. */
+static bool find_target(confirmation *c, uint32_t object)
+{
+    const model_object *o = &c->t->model->objects[object];
+    uint32_t count = o->mesh != MODEL_NONE ? c->t->model->meshes[o->mesh].triangle_count : 0;
+    bool found = false;
+    for (uint32_t i = 0; i < count; ++i) {
+        float v[3][3];
+        exact_crossing at;
+        oracle_triangle(c->t, object, i, v);
+        if (!reach(c, v, &at)) {
+            continue;
+        }
+        if (c->renderer == TRUTH_CULLING && !oracle_shown(oracle_flags(c->t, object, i), at.facing)) {
+            continue;
+        }
+        if ((!found || exact_compare(&at, &c->target, &c->lost) < 0) && in_view(c, &at)) {
+            c->target = at;
+            found = true;
+        }
+    }
+    return found && !c->lost;
+}
+
+static bool all_nearer_than_near(confirmation *c, float v[3][3])
+{
+    const umb_view *view = c->v->view;
+    for (int i = 0; i < 3; ++i) {
+        double p[3] = {v[i][0], v[i][1], v[i][2]};
+        exact depth, near_depth, beyond;
+        exact_dot(p, view->eye, view->forward, &depth);
+        exact_set(&near_depth, view->near_depth);
+        exact_subtract(&beyond, &depth, &near_depth);
+        if (exact_sign(&beyond, &c->lost) >= 0) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static bool blocks(confirmation *c, uint32_t object, uint32_t triangle)
+{
+    float v[3][3];
+    exact_crossing at;
+    uint8_t flags = oracle_flags(c->t, object, triangle);
+    if (flags & UMB_TRIANGLE_OPEN) {
+        return false;
+    }
+    oracle_triangle(c->t, object, triangle, v);
+    switch (exact_line_triangle(&c->line, v, &at, &c->lost)) {
+    case EXACT_MISS:
+        return false;
+    case EXACT_IN_PLANE:
+        return !exact_degenerate(v, &c->lost) &&
+               !exact_in_plane_free(&c->line, v, &c->target, &c->lost) &&
+               !all_nearer_than_near(c, v);
+    case EXACT_CROSS:
+        break;
+    }
+    if (c->renderer == TRUTH_CULLING && !oracle_shown(flags, at.facing)) {
+        return false;
+    }
+    return linear_sign(c, &c->beyond_near, &at) >= 0 &&
+           exact_compare(&at, &c->target, &c->lost) < 0;
+}
+
+/* Does the segment meet the box? Grown by 1e-9 of the largest coordinate: a million times what the
+ * rounding of these few operations can be, so a box that is touched is never passed over. */
+static bool segment_meets_box(const double from[3], const double to[3], const umb_aabb *box)
+{
+    double low = 0.0, high = 1.0;
+    for (int i = 0; i < 3; ++i) {
+        double d = to[i] - from[i];
+        double size = fmax(fmax(fabs(from[i]), fabs(to[i])),
+                           fmax(fabs((double)box->min[i]), fabs((double)box->max[i])));
+        double a = box->min[i] - from[i] - 1e-9 * size, b = box->max[i] - from[i] + 1e-9 * size;
+        if (fabs(d) <= 1e-9 * size) {
+            if (a > fabs(d) || b < -fabs(d)) {
+                return false;
+            }
+            continue;
+        }
+        double s0 = a / d, s1 = b / d;
+        low = fmax(low, fmin(s0, s1));
+        high = fmin(high, fmax(s0, s1));
+    }
+    return low <= high + 1e-9;
+}
+
+static bool path_is_free(confirmation *c, const double to[3])
+{
+    const model *m = c->t->model;
+    for (uint32_t i = 0; i < m->object_count; ++i) {
+        const model_object *o = &m->objects[i];
+        if (o->mesh == MODEL_NONE || !segment_meets_box(c->sight.from, to, &o->bounds)) {
+            continue;
+        }
+        for (uint32_t k = 0; k < m->meshes[o->mesh].triangle_count; ++k) {
+            if (blocks(c, i, k) || c->lost) {
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+bool oracle_confirm(const truth *t, const oracle_view *v, const double through[3], uint32_t object,
+                    uint8_t renderer, truth_witness *out)
+{
+    const umb_view *view = v->view;
+    confirmation c = {.t = t, .v = v, .through = through, .renderer = renderer};
+    if (!view_in_range(view) || !in_range3(through) || !oracle_sight_make(v, through, &c.sight)) {
+        return false;
+    }
+    if (view->projection == UMB_PERSPECTIVE) {
+        exact_line_through(&c.line, view->eye, through);
+    } else {
+        exact_line_along(&c.line, through, view->forward);
+    }
+    make_linear(&c.line, view->eye, view->forward, view->near_depth, &c.beyond_near);
+    if (exact_sign(&c.beyond_near.slope, &c.lost) <= 0 || !find_target(&c, object)) {
+        return false;
+    }
+    double s = exact_estimate(&c.target.numerator) / exact_estimate(&c.target.denominator);
+    truth_witness w = {.renderers = renderer, .confirmed = 1};
+    for (int i = 0; i < 3; ++i) {
+        w.from[i] = c.sight.from[i];
+        w.to[i] = c.line.origin[i] + s * c.line.approximate[i];
+    }
+    if (!path_is_free(&c, w.to) || c.lost) {
+        return false;
+    }
+    *out = w;
+    return true;
+}
+
+bool oracle_confirm_near(const truth *t, const oracle_view *v, const double through[3],
+                         uint32_t object, uint32_t triangle, uint8_t renderer, truth_witness *out)
+{
+    if (oracle_confirm(t, v, through, object, renderer, out)) {
+        return true;
+    }
+    float corner[3][3];
+    oracle_polygon polygon;
+    oracle_triangle(t, object, triangle, corner);
+    oracle_clip(v, corner, &polygon);
+    for (uint32_t k = 0; k < NEARBY_LINES && polygon.count; ++k) {
+        double towards[3], point[3];
+        uint64_t random = oracle_mix(object, triangle, k);
+        oracle_polygon_point(&polygon, UINT32_MAX, 0.0, random, towards);
+        /* From a ten-millionth of the way to other points of the triangle up to all of it. */
+        double step = pow(10.0, -7.0 + 0.25 * (double)(k + 1));
+        for (int i = 0; i < 3; ++i) {
+            point[i] = through[i] + step * (towards[i] - through[i]);
+        }
+        if (oracle_confirm(t, v, point, object, renderer, out)) {
+            return true;
+        }
+    }
+    for (int i = 0; i < 3; ++i) {
+        double point[3] = {corner[i][0], corner[i][1], corner[i][2]};
+        if (oracle_confirm(t, v, point, object, renderer, out)) {
+            return true;
+        }
+    }
+    return false;
+}

@@ -1,0 +1,121 @@
+/* What the oracle's files share: the traced scene, sight-lines, and one search of a view. */
+#ifndef ORACLE_H
+#define ORACLE_H
+
+#include <embree3/rtcore.h>
+
+#include "truth.h"
+
+/* A traced geometry's triangles: primitive number -> object (flattened scenes) and mesh triangle. */
+typedef struct oracle_part {
+    uint32_t *objects; /* NULL in instanced scenes: the instance says it */
+    uint32_t *triangles;
+    uint32_t count;
+} oracle_part;
+
+/* Geometry numbers: how a triangle blocks. */
+enum { PART_BOTH_SIDES = 0, PART_ONE_SIDE = 1, PART_OPEN = 2, PART_KINDS = 3 };
+
+struct truth {
+    const model *model;
+    RTCDevice device;
+    RTCScene scene;
+    bool flat;                /* one soup of world vertices; else instances of mesh scenes */
+    float *vertices;          /* flat: world vertices of all objects */
+    uint32_t *indices[PART_KINDS];
+    uint64_t *first_vertex;   /* flat: per object, into vertices */
+    uint64_t *first_triangle; /* per object, and the total at the end: numbers triangles of objects */
+    bool *mirrored;           /* per object */
+    oracle_part parts[PART_KINDS]; /* flat */
+    oracle_part (*mesh_parts)[PART_KINDS]; /* instanced: per mesh */
+    RTCScene *mesh_scenes;
+    uint32_t **neighbours;    /* per mesh, three per triangle, made when first needed */
+};
+
+/* World corners of a triangle, counter-clockwise seen from its front. */
+void oracle_triangle(const truth *t, uint32_t object, uint32_t triangle, float v[3][3]);
+uint8_t oracle_flags(const truth *t, uint32_t object, uint32_t triangle);
+/* A mesh's neighbours across its edges (corner i to i + 1), found by equal positions; MODEL_NONE where
+ * there is no single one. NULL when memory is short. Not safe from two threads at once. */
+const uint32_t *oracle_neighbours(truth *t, uint32_t mesh);
+
+/* A view as half-spaces, and how far anything can be. */
+typedef struct oracle_view {
+    const umb_view *view;
+    double planes[6 + UMB_MAX_CLIP_PLANES][4]; /* inside where >= 0 */
+    uint32_t plane_count;
+    double far_depth;  /* the view's, or just beyond the scene where that is nearer */
+    double pixel[2];   /* size of a grid cell at depth 1 (orthographic: anywhere) */
+} oracle_view;
+
+void oracle_view_make(const truth *t, const umb_view *view, const truth_options *options,
+                      oracle_view *out);
+bool oracle_view_holds(const oracle_view *v, const double p[3]);
+/* False only when no point of the box is in the view. */
+bool oracle_view_meets_box(const oracle_view *v, const umb_aabb *box);
+
+/* A point in front of the eye that shows at picture coordinates in [0, 1], y from the top. */
+void oracle_picture_point(const oracle_view *v, double x, double y, double out[3]);
+
+/* A sight-line: from + s * along, where s is view depth beyond the near plane. */
+typedef struct oracle_sight {
+    double from[3], along[3];
+    double through[3]; /* a point that names the line exactly: with the eye, or with forward */
+} oracle_sight;
+
+/* The sight-line through a point; false when it lies behind the eye or beside the picture. */
+bool oracle_sight_make(const oracle_view *v, const double through[3], oracle_sight *out);
+void oracle_sight_at(const oracle_sight *s, double depth_beyond_near, double out[3]);
+
+typedef struct oracle_hit {
+    uint32_t object;   /* MODEL_NONE: nothing */
+    uint32_t triangle;
+    double depth;      /* view depth beyond the near plane */
+    int facing;        /* -1 from the front, 1 from the back, 0 edge-on */
+} oracle_hit;
+
+/* First blocking hits for either renderer, and the open surfaces before the farther one. The arrays
+ * belong to the caller and are used again from ray to ray. */
+typedef struct oracle_trace {
+    oracle_hit two_sided, culling;
+    oracle_hit *open;
+    uint32_t open_count, open_capacity;
+    uint64_t rays;
+    bool out_of_memory;
+} oracle_trace;
+
+void oracle_trace_ray(const truth *t, const oracle_view *v, const oracle_sight *sight,
+                      oracle_trace *trace);
+/* Depth beyond near at which the line crosses the triangle's plane; fallback where it runs along. */
+double oracle_plane_depth(float v[3][3], const oracle_sight *sight, double fallback, int *facing);
+/* True if a triangle so met is shown by TRUTH_CULLING. */
+bool oracle_shown(uint8_t flags, int facing);
+
+/* Is the sight-line through this point free up to the object, in exact arithmetic (confirm.c)? */
+bool oracle_confirm(const truth *t, const oracle_view *v, const double through[3], uint32_t object,
+                    uint8_t renderer, truth_witness *out);
+/* The same for a line that rays found to end on a triangle of the object: if it does not hold, lines
+ * near it are tried. */
+bool oracle_confirm_near(const truth *t, const oracle_view *v, const double through[3],
+                         uint32_t object, uint32_t triangle, uint8_t renderer, truth_witness *out);
+
+/* A triangle cut to the view. */
+#define ORACLE_POLYGON 24
+typedef struct oracle_polygon {
+    double corner[ORACLE_POLYGON][3];
+    double centre[3];
+    uint32_t count; /* 0: nothing of it is in the view */
+} oracle_polygon;
+
+void oracle_clip(const oracle_view *v, float triangle[3][3], oracle_polygon *out);
+/* A point of the polygon. which 0: the centre; then corners and edge midpoints, pulled towards the
+ * centre by `pull`; from 1 + 2 * count on, spread by `random`. */
+void oracle_polygon_point(const oracle_polygon *p, uint32_t which, double pull, uint64_t random,
+                          double out[3]);
+
+/* A well mixed number from three. */
+uint64_t oracle_mix(uint64_t a, uint64_t b, uint64_t c);
+/* [0, 1) */
+double oracle_unit(uint64_t bits);
+
+#endif
