@@ -65,8 +65,8 @@ UMB_API void umb_culler_destroy(umb_culler *culler);
 UMB_API umb_result umb_cull(umb_culler *culler, const umb_view *view, umb_visible_set *out);
 
 /* The occlusion buffer after the last umb_cull: for each pixel, row by row from the top, 1 / depth of
- * a bound that what is covered lies at or in front of; 0 where not covered. For orthographic views the
- * value is far + 1 - depth. Returns false, with the sizes only, when pixels is NULL or capacity (in
+ * a bound that what covers it lies in front of; 0 where not covered. For orthographic views the value is
+ * 1 / (1 + depth - near depth). Returns false, with the sizes only, when pixels is NULL or capacity (in
  * floats) is too small, or when the method has no buffer (sizes 0). */
 UMB_API bool umb_culler_read_buffer(const umb_culler *culler, float *pixels, size_t capacity,
                                     uint32_t *width, uint32_t *height);

@@ -1,0 +1,365 @@
+/* The pipeline: frustum, occlusion, contribution (Gummerus 2), over a best-first walk of the index.
+ *
+ *     push the root
+ *     pop the nearest waiting entry; hidden by what was drawn since it was tested: drop it
+ *       node:     eight boxes at once against the frustum, then the raster; push what is left
+ *       occluder: draw it
+ *       object:   test the parts of its shape; report it; draw the occluder that it owns
+ *
+ * Best-first, not depth-first: an occluder that can hide a box has the smaller key, so it is already in
+ * the buffer when the box is tested. Keys of children are never smaller than their parent's, so objects
+ * come out front to back.
+ */
+#include "culler.h"
+
+#include <string.h>
+
+#include "base/memory.h"
+#include "frustum/box_kernels.h"
+#include "frustum/frustum.h"
+#include "heap.h"
+#include "index/tree.h"
+#include "occlusion/image.h"
+#include "occlusion/method.h"
+
+struct umb_culler {
+    umb_allocator allocator;
+    const umb_index *index;
+    umb_culler_def def;
+    const umb_box_kernels *kernels;
+    const umb_method_ops *ops; /* NULL: no occlusion */
+    void *method;
+    umb_heap heap;
+    uint32_t *objects;
+    uint8_t *inside;
+    uint8_t *planes; /* per node: the plane that all its boxes failed last time (plane coherency) */
+    size_t object_capacity, inside_capacity, plane_capacity;
+    uint32_t count;
+    bool answered;
+    umb_view view; /* of the last answer */
+};
+
+/* One frame's state. */
+typedef struct walk {
+    umb_culler *culler;
+    const umb_committed *scene;
+    const umb_tree *tree;
+    umb_frustum frustum;
+    umb_raster_map map;
+    umb_projector projector;
+    double picture_x, picture_y; /* picture pixels in one raster pixel */
+    double min_pixels;
+    uint32_t drawn;
+    umb_cull_stats stats;
+} walk;
+
+umb_result umb_culler_create(const umb_index *index, const umb_culler_def *def, umb_culler **out)
+{
+    static const umb_culler_def zero = {0};
+    def = def != NULL ? def : &zero;
+    *out = NULL;
+    const umb_box_kernels *kernels = umb_box_kernels_get(def->isa);
+    if (kernels == NULL) {
+        return umb_error_set(def->error, UMB_ERROR_ARGUMENT, "instruction set %s is not available here",
+                             umb_isa_name(def->isa));
+    }
+    if (def->method != UMB_METHOD_RASTER && def->method != UMB_METHOD_NONE) {
+        return umb_error_set(def->error, UMB_ERROR_ARGUMENT, "unknown method %d", (int)def->method);
+    }
+    const umb_allocator *allocator = umb_scene_allocator(umb_index_scene(index));
+    umb_culler *c = umb_memory_allocate_zero(allocator, 1, sizeof *c);
+    if (c == NULL) {
+        return umb_error_set(def->error, UMB_ERROR_MEMORY, "no memory for a culler");
+    }
+    c->allocator = *allocator;
+    c->index = index;
+    c->def = *def;
+    c->kernels = kernels;
+    c->ops = umb_method_get(def->method);
+    if (c->ops != NULL && c->ops->create(allocator, &c->method) != UMB_OK) {
+        umb_memory_free(allocator, c, sizeof *c);
+        return umb_error_set(def->error, UMB_ERROR_MEMORY, "no memory for a culler");
+    }
+    *out = c;
+    return UMB_OK;
+}
+
+void umb_culler_destroy(umb_culler *c)
+{
+    if (c == NULL) {
+        return;
+    }
+    umb_allocator a = c->allocator;
+    if (c->ops != NULL) {
+        c->ops->destroy(c->method);
+    }
+    umb_memory_free(&a, c->heap.items, c->heap.capacity * sizeof *c->heap.items);
+    umb_memory_free(&a, c->objects, c->object_capacity * sizeof *c->objects);
+    umb_memory_free(&a, c->inside, c->inside_capacity);
+    umb_memory_free(&a, c->planes, c->plane_capacity);
+    umb_memory_free(&a, c, sizeof *c);
+}
+
+/* Everything that a walk can need, so that it never allocates: each item and node waits at most once. */
+static bool reserve(umb_culler *c, const umb_tree *tree, const umb_committed *scene)
+{
+    const umb_allocator *a = &c->allocator;
+    size_t planes = c->plane_capacity;
+    if (!umb_memory_reserve(a, (void **)&c->heap.items, &c->heap.capacity,
+                            (size_t)tree->item_count + tree->node_count, sizeof *c->heap.items) ||
+        !umb_memory_reserve(a, (void **)&c->objects, &c->object_capacity, scene->object_count,
+                            sizeof *c->objects) ||
+        !umb_memory_reserve(a, (void **)&c->inside, &c->inside_capacity, scene->object_count, 1) ||
+        !umb_memory_reserve(a, (void **)&c->planes, &c->plane_capacity, tree->node_count, 1)) {
+        return false;
+    }
+    memset(c->planes + planes, 0, c->plane_capacity - planes);
+    return true;
+}
+
+static bool hidden(walk *w, uint32_t ref, const umb_image *image)
+{
+    const umb_culler *c = w->culler;
+    if (c->ops == NULL) {
+        return false;
+    }
+    umb_query query = {*image, ref};
+    umb_verdict verdict;
+    c->ops->submit(c->method, &query, 1, &verdict);
+    w->stats.queries += 1;
+    return verdict == UMB_VERDICT_HIDDEN;
+}
+
+static void count_hidden(walk *w, uint32_t ref)
+{
+    uint32_t kind = ref & UMB_REF_KIND;
+    w->stats.hidden_nodes += kind == UMB_REF_NODE;
+    w->stats.hidden_objects += kind == UMB_REF_OBJECT;
+}
+
+/* Contribution culling: too small in the picture both ways. */
+static bool too_small(walk *w, uint32_t ref, const umb_image_bounds *b)
+{
+    if (!(w->min_pixels > 0.0) || (ref & UMB_REF_KIND) == UMB_REF_OCCLUDER) {
+        return false;
+    }
+    bool small = (b->x_max - b->x_min) * w->picture_x < w->min_pixels &&
+                 (b->y_max - b->y_min) * w->picture_y < w->min_pixels;
+    w->stats.small += small && (ref & UMB_REF_KIND) == UMB_REF_OBJECT;
+    return small;
+}
+
+static void consider(walk *w, const umb_node *node, const umb_projected *p, uint32_t slot, uint16_t planes)
+{
+    umb_waiting item = {0};
+    item.key = p->w_min[slot];
+    item.ref = node->ref[slot];
+    item.planes = planes;
+    item.stamp = w->drawn;
+    item.testable = p->w_min[slot] >= w->map.near_depth && (w->map.orthographic || p->w_min[slot] > 0.0);
+    w->stats.in_frustum += (item.ref & UMB_REF_KIND) == UMB_REF_OBJECT;
+    if (item.testable) {
+        umb_image_bounds b = {p->x_min[slot], p->y_min[slot], p->x_max[slot], p->y_max[slot],
+                              p->w_min[slot]};
+        if (too_small(w, item.ref, &b)) {
+            return;
+        }
+        item.image = umb_image_of_bounds(&w->map, &b);
+        if (hidden(w, item.ref, &item.image)) {
+            count_hidden(w, item.ref);
+            return;
+        }
+    }
+    umb_heap_push(&w->culler->heap, &item);
+}
+
+static void open_node(walk *w, uint32_t number, uint16_t planes)
+{
+    umb_culler *c = w->culler;
+    const umb_node *node = &w->tree->nodes[number];
+    uint16_t child_planes[UMB_NODE_WIDTH];
+    uint32_t outside = umb_frustum_test_node(&w->frustum, c->kernels, node, planes, &c->planes[number],
+                                             child_planes);
+    uint32_t left = ~outside & ((1u << node->count) - 1u);
+    w->stats.nodes += 1;
+    w->stats.boxes += node->count;
+    if (left == 0) {
+        return;
+    }
+    umb_projected projected;
+    c->kernels->project(node, &w->projector, &projected);
+    for (uint32_t slot = 0; slot < node->count; ++slot) {
+        if ((left >> slot & 1u) != 0) {
+            consider(w, node, &projected, slot, child_planes[slot]);
+        }
+    }
+}
+
+static void draw(walk *w, uint32_t occluder)
+{
+    const umb_culler *c = w->culler;
+    if (c->ops != NULL && occluder != UMB_NONE &&
+        c->ops->occlude(c->method, occluder, &w->stats)) {
+        w->drawn += 1;
+    }
+}
+
+/* The parts of the shape, when they say more than the object's box: hidden if each of them is. */
+static bool parts_hidden(walk *w, const umb_object *o, uint32_t ref)
+{
+    if (!o->refine || w->culler->ops == NULL || (o->mesh->part_count == 1 && o->identity)) {
+        return false;
+    }
+    for (uint32_t i = 0; i < o->mesh->part_count; ++i) {
+        umb_image_bounds b;
+        if (!umb_image_of_part(&w->map, &o->mesh->parts[i], &o->transform, o->identity, &b)) {
+            return false;
+        }
+        umb_image image = umb_image_of_bounds(&w->map, &b);
+        if (!hidden(w, ref, &image)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static void visit_object(walk *w, const umb_waiting *item)
+{
+    umb_culler *c = w->culler;
+    uint32_t id = item->ref & UMB_REF_NUMBER;
+    const umb_object *o = &w->scene->objects[id];
+    if (item->testable && parts_hidden(w, o, item->ref)) {
+        w->stats.hidden_objects += 1;
+        return;
+    }
+    c->objects[c->count] = id;
+    c->inside[c->count] = item->planes == 0;
+    c->count += 1;
+    draw(w, o->occluder);
+}
+
+static void run(walk *w)
+{
+    umb_culler *c = w->culler;
+    uint32_t roots = w->tree->flat ? w->tree->node_count : w->tree->node_count > 0;
+    for (uint32_t i = 0; i < roots; ++i) {
+        open_node(w, i, w->frustum.all_planes);
+    }
+    while (c->heap.count > 0) {
+        umb_waiting item = umb_heap_pop(&c->heap);
+        if (item.testable && item.stamp != w->drawn && hidden(w, item.ref, &item.image)) {
+            count_hidden(w, item.ref);
+            continue;
+        }
+        switch (item.ref & UMB_REF_KIND) {
+        case UMB_REF_NODE:
+            open_node(w, item.ref & UMB_REF_NUMBER, item.planes);
+            break;
+        case UMB_REF_OCCLUDER:
+            draw(w, item.ref & UMB_REF_NUMBER);
+            break;
+        default:
+            visit_object(w, &item);
+        }
+    }
+}
+
+static void prepare_projector(umb_projector *p, const umb_raster_map *map)
+{
+    *p = (umb_projector){.eye = {map->eye.x, map->eye.y, map->eye.z},
+                         .x = {map->x.x, map->x.y, map->x.z},
+                         .y = {map->y.x, map->y.y, map->y.z},
+                         .w = {map->w.x, map->w.y, map->w.z},
+                         .cx = map->cx,
+                         .cy = map->cy,
+                         .orthographic = map->orthographic};
+}
+
+static void prepare_walk(walk *w, umb_culler *c, const umb_view *view)
+{
+    memset(w, 0, sizeof *w);
+    w->culler = c;
+    w->tree = umb_index_tree(c->index);
+    w->scene = umb_scene_committed(umb_index_scene(c->index));
+    umb_frustum_prepare(&w->frustum, view);
+    umb_raster_map_prepare(&w->map, view);
+    prepare_projector(&w->projector, &w->map);
+    w->picture_x = (view->width != 0 ? view->width : 1024.0) / w->map.width;
+    w->picture_y = (view->height != 0 ? view->height : 512.0) / w->map.height;
+    w->min_pixels = view->min_pixels;
+}
+
+umb_result umb_cull(umb_culler *c, const umb_view *view, umb_visible_set *out)
+{
+    memset(out, 0, sizeof *out);
+    c->answered = false;
+    c->count = 0;
+    umb_result result = umb_view_check(view, c->def.error);
+    if (result != UMB_OK) {
+        return result;
+    }
+    walk w;
+    prepare_walk(&w, c, view);
+    if (!reserve(c, w.tree, w.scene) ||
+        (c->ops != NULL && c->ops->prepare(c->method, &w.map, w.scene) != UMB_OK)) {
+        return umb_error_set(c->def.error, UMB_ERROR_MEMORY, "no memory for the frame");
+    }
+    c->heap.count = 0;
+    run(&w);
+    w.stats.visible = c->count;
+    c->view = *view;
+    c->answered = true;
+    out->objects = c->objects;
+    out->inside = c->inside;
+    out->count = c->count;
+    out->class_ = view->min_pixels > 0.0 ? UMB_CLASS_APPROXIMATE
+                  : c->ops != NULL       ? c->ops->class_
+                                         : UMB_CLASS_STRICT;
+    out->stats = w.stats;
+    return UMB_OK;
+}
+
+bool umb_culler_read_buffer(const umb_culler *c, float *pixels, size_t capacity, uint32_t *width,
+                            uint32_t *height)
+{
+    *width = *height = 0;
+    if (c->ops == NULL || !c->answered) {
+        return false;
+    }
+    const umb_coverage *b = c->ops->buffer(c->method);
+    *width = b->width;
+    *height = b->height;
+    if (pixels == NULL || capacity < (size_t)b->width * b->height) {
+        return false;
+    }
+    bool parallel = c->view.projection == UMB_ORTHOGRAPHIC;
+    for (uint32_t y = 0; y < b->height; ++y) {
+        for (uint32_t x = 0; x < b->width; ++x) {
+            const umb_tile *t =
+                &b->tiles[(size_t)(y / UMB_TILE_HEIGHT) * b->columns + x / UMB_TILE_WIDTH];
+            uint32_t r = y % UMB_TILE_HEIGHT, column = x % UMB_TILE_WIDTH;
+            bool covered = (t->mask[r] >> column & 1u) != 0;
+            float z = t->z[4 * (r / 4) + column / 8];
+            pixels[(size_t)y * b->width + x] =
+                !covered ? 0.0f : parallel ? (float)(1.0 / (1.0 - z - c->view.near_depth)) : z;
+        }
+    }
+    return true;
+}
+
+const umb_index *umb_culler_index(const umb_culler *culler)
+{
+    return culler->index;
+}
+
+umb_culler_def umb_culler_settings(const umb_culler *culler)
+{
+    return culler->def;
+}
+
+const umb_view *umb_culler_last_view(const umb_culler *culler, const uint32_t **ids, uint32_t *count)
+{
+    *ids = culler->objects;
+    *count = culler->count;
+    return culler->answered ? &culler->view : NULL;
+}
