@@ -72,8 +72,7 @@ static uint32_t gather(const umb_bvh_split *splits, uint32_t node, int j, uint32
 }
 
 /* The slots of the wide node at a subtree's root. */
-static uint32_t open_node(const umb_bvh_split *splits, uint32_t node,
-                          uint32_t slots[UMB_NODE_WIDTH])
+static uint32_t open_node(const umb_bvh_split *splits, uint32_t node, uint32_t slots[UMB_NODE_WIDTH])
 {
     if (node & UMB_BVH_ITEM) {
         slots[0] = node;

@@ -30,7 +30,7 @@ umb_aabb umb_node_bounds(const umb_node *node);
 /* Split items into a binary tree; bvh_split.c. Node k of the tree splits its items between k - 1 and
  * k: every position is used once, so threads need no counter to number their nodes. */
 typedef struct umb_bvh_split {
-    uint32_t left, right; /* a split, or an item with UMB_BVH_ITEM set */
+    uint32_t left, right;         /* a split, or an item with UMB_BVH_ITEM set */
     uint8_t pick[UMB_NODE_WIDTH]; /* [j - 1]: how many of j slots go left; 0: as for j - 1 slots, and
                                      for one slot a node of its own, whose slots [7] deals out */
 } umb_bvh_split;

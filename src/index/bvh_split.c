@@ -92,7 +92,7 @@ typedef struct choice {
     double cost;      /* areas times counts; INFINITY: none */
     uint32_t balance; /* the smaller side's count: breaks ties, so that flat sets are halved */
     int axis;
-    int bin;          /* items in lower bins go left; in a sweep: that many items go left */
+    int bin; /* items in lower bins go left; in a sweep: that many items go left */
     box4 left, right;
 } choice;
 
@@ -216,8 +216,8 @@ static void sweep_axis(const umb_bvh_item *items, uint32_t n, int axis, choice *
     box = empty_box;
     for (uint32_t i = 1; i < n; ++i) {
         box_grow(&box, items[i - 1].min, items[i - 1].max);
-        double cost =
-            box_area(box.min, box.max) * i + box_area(right[i].min, right[i].max) * (n - i);
+        double cost = box_area(box.min, box.max) * i +
+                      box_area(right[i].min, right[i].max) * (n - i);
         consider(best, cost, i, n - i, axis, (int)i, &box, &right[i]);
     }
 }
