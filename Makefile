@@ -29,10 +29,11 @@ asan: deps ## the small test sets with AddressSanitizer and UndefinedBehaviorSan
 	@$(BUILD) build/asan -j $(JOBS)
 	UMBRAGE_TEST_SIZE=$${UMBRAGE_TEST_SIZE:-small} $(CTEST) build/asan
 
-check: deps ## layers, exports, headers and words
+check: deps ## layers, exports, headers, package and words
 	@scripts/check-layers
 	@scripts/check-headers
 	@scripts/check-exports
+	@scripts/check-package
 	@scripts/check-words
 
 matrix: build ## Clang, ThreadSanitizer, scalar-only, -O0, -O3: tests, and equal answers everywhere
