@@ -28,7 +28,8 @@ static model *load_bytes(const char *scene, const model_options *options, umb_er
     if (!input_read(scene, &in, error)) {
         return NULL;
     }
-    model *m = read_bsp(&in, scene, options, error);
+    model *m = input_ends_with(scene, ".bsp") ? read_bsp(&in, scene, options, error)
+                                              : read_cityjson(in.data, in.size, scene, options, error);
     input_free(&in);
     return m;
 }
@@ -64,7 +65,7 @@ model *model_load(const char *scene, const model_options *options, umb_error *er
     if (colon != NULL || input_ends_with(scene, ".pk3")) {
         return load_packed(scene, colon, options, error);
     }
-    if (input_ends_with(scene, ".bsp")) {
+    if (input_ends_with(scene, ".bsp") || input_ends_with(scene, ".json")) {
         return load_bytes(scene, options, error);
     }
     return read_assimp(scene, options, error);

@@ -10,7 +10,11 @@
 
 #include "bsp_scene.h"
 #include "model_parts.h"
+#include "polygon.h"
 #include "readers.h"
+
+/* The game's own compilers write at most 64 sides; larger faces of hostile files are not worth care. */
+#define SMALL_FACE 64
 
 typedef struct q1_map {
     bsp_lump textures, vertices, texinfo, faces, leaves, mark_surfaces, edges, surf_edges, models;
@@ -61,48 +65,85 @@ static bool see_through(const char *texture)
     return texture[0] == '*' || texture[0] == '{' || strcasecmp(texture, "trigger") == 0;
 }
 
-static bool read_face(bsp_scene *s, const q1_map *map, uint32_t number, bool sky)
+/* Corner number i of a face. */
+static bool face_corner(bsp_scene *s, const q1_map *map, uint32_t face, uint32_t i, uint32_t *vertex)
+{
+    uint32_t first = le32(map->faces.data + 20 * (size_t)face + 4);
+    uint32_t signed_edge = le32(map->surf_edges.data + 4 * (size_t)(first + i));
+    bool backwards = signed_edge >> 31 != 0;
+    uint32_t edge = backwards ? 0u - signed_edge : signed_edge;
+    if (edge >= map->edges.count) {
+        return model_fail(s->error, UMB_ERROR_FORMAT, "%s: face %u names edge %u of %u; use another map", s->name,
+                          face, edge, map->edges.count);
+    }
+    *vertex = le16(map->edges.data + 4 * (size_t)edge + (backwards ? 2 : 0));
+    return *vertex < s->position_count ||
+           model_fail(s->error, UMB_ERROR_FORMAT, "%s: edge %u names vertex %u of %u; use another map", s->name, edge,
+                      *vertex, s->position_count);
+}
+
+/* The map compiler puts corners into the middle of straight sides, where neighbours meet them. A plain
+ * fan would make slivers of no area there, and leave the sides' halves without a triangle. */
+static bool add_small_face(bsp_scene *s, const uint32_t *ring, uint32_t sides)
+{
+    double corners[SMALL_FACE][3];
+    uint32_t cut[SMALL_FACE + 2][3];
+    for (uint32_t i = 0; i < sides; ++i) {
+        for (int k = 0; k < 3; ++k) {
+            /* Fronts are clockwise in the file. */
+            corners[i][k] = s->positions[ring[sides - 1 - i]][k];
+        }
+    }
+    const uint32_t starts[2] = {0, sides};
+    polygon p = {.corners = (const double(*)[3])corners, .starts = starts, .rings = 1};
+    bool sound;
+    uint32_t count = polygon_triangulate(&p, cut, &sound);
+    if (count == UINT32_MAX) {
+        return model_fail_memory(s->error, s->name);
+    }
+    for (uint32_t t = 0; t < count; ++t) {
+        if (!bsp_add_triangle(s, ring[sides - 1 - cut[t][0]], ring[sides - 1 - cut[t][1]],
+                              ring[sides - 1 - cut[t][2]])) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static bool add_large_face(bsp_scene *s, const uint32_t *ring, uint32_t sides)
+{
+    for (uint32_t i = 2; i < sides; ++i) {
+        if (!bsp_add_triangle(s, ring[0], ring[i], ring[i - 1])) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static bool read_face(bsp_scene *s, const q1_map *map, uint32_t number, bool sky, uint32_t *ring)
 {
     const uint8_t *face = map->faces.data + 20 * (size_t)number;
-    uint32_t first = le32(face + 4);
     uint32_t sides = le16(face + 8);
     uint32_t texinfo = le16(face + 10);
-    if (!bsp_range(first, sides, map->surf_edges.count) || texinfo >= map->texinfo.count) {
+    if (!bsp_range(le32(face + 4), sides, map->surf_edges.count) || texinfo >= map->texinfo.count) {
         return model_fail(s->error, UMB_ERROR_FORMAT,
                           "%s: face %u names edges or a texture that are not there; use another map", s->name,
                           number);
     }
     char texture[16];
     texture_name(map, le32(map->texinfo.data + 40 * (size_t)texinfo + 32), texture);
-    bool is_sky = strncasecmp(texture, "sky", 3) == 0;
     bsp_surface *surface = &s->surfaces[s->surface_count++];
     surface->first = s->triangle_count;
-    surface->left_out = is_sky && !sky;
+    surface->left_out = strncasecmp(texture, "sky", 3) == 0 && !sky;
     surface->flags = see_through(texture) ? UMB_TRIANGLE_OPEN : 0;
-    uint32_t fan[3] = {0};
     for (uint32_t i = 0; i < sides; ++i) {
-        uint32_t signed_edge = le32(map->surf_edges.data + 4 * (size_t)(first + i));
-        bool backwards = signed_edge >> 31 != 0;
-        uint32_t edge = backwards ? 0u - signed_edge : signed_edge;
-        if (edge >= map->edges.count) {
-            return model_fail(s->error, UMB_ERROR_FORMAT,
-                              "%s: face %u names edge %u of %u; use another map", s->name, number, edge,
-                              map->edges.count);
-        }
-        fan[2] = le16(map->edges.data + 4 * (size_t)edge + (backwards ? 2 : 0));
-        fan[0] = i == 0 ? fan[2] : fan[0];
-        if (fan[2] >= s->position_count) {
-            return model_fail(s->error, UMB_ERROR_FORMAT, "%s: edge %u names vertex %u of %u; use another map",
-                              s->name, edge, fan[2], s->position_count);
-        }
-        /* Fronts are clockwise in the file. */
-        if (i >= 2 && !bsp_add_triangle(s, fan[0], fan[2], fan[1])) {
+        if (!face_corner(s, map, number, i, &ring[i])) {
             return false;
         }
-        fan[1] = fan[2];
     }
+    bool added = sides <= SMALL_FACE ? add_small_face(s, ring, sides) : add_large_face(s, ring, sides);
     surface->count = s->triangle_count - surface->first;
-    return true;
+    return added;
 }
 
 static bool read_surfaces(bsp_scene *s, const q1_map *map, bool sky)
@@ -116,8 +157,9 @@ static bool read_surfaces(bsp_scene *s, const q1_map *map, bool sky)
             return false;
         }
     }
+    uint32_t ring[UINT16_MAX];
     for (uint32_t i = 0; i < map->faces.count; ++i) {
-        if (!read_face(s, map, i, sky)) {
+        if (!read_face(s, map, i, sky, ring)) {
             return false;
         }
     }
