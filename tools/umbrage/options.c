@@ -1,0 +1,465 @@
+#include "options.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define BIT(command) (1u << COMMAND_##command)
+
+enum {
+    ALL = (1u << COMMAND_COUNT) - 1,
+    ONE_VIEW = BIT(CULL) | BIT(EXPLAIN),
+    MANY_VIEWS = BIT(WALK) | BIT(CHECK),
+    VIEWS = ONE_VIEW | MANY_VIEWS,
+    SCENES = BIT(INFO) | VIEWS
+};
+
+/* ---- values --------------------------------------------------------------------------------- */
+/* Each reader returns NULL, or what it had wanted to read. */
+
+static bool read_number(const char *text, const char **end, double *out)
+{
+    char *stop;
+    /* strtod also takes blanks, hexadecimal digits and words. */
+    if (strspn(text, "+-.0123456789eE") == 0) {
+        return false;
+    }
+    *out = strtod(text, &stop);
+    *end = stop;
+    return stop != text && isfinite(*out);
+}
+
+static const char *number(const char *text, double *out)
+{
+    const char *end;
+    return read_number(text, &end, out) && *end == '\0' ? NULL : "a number";
+}
+
+static const char *point(const char *text, double out[3])
+{
+    for (int i = 0; i < 3; ++i) {
+        if (!read_number(text, &text, &out[i]) || *text != (i < 2 ? ',' : '\0')) {
+            return "three numbers X,Y,Z";
+        }
+        ++text;
+    }
+    return NULL;
+}
+
+/* Digits, perhaps k or M. */
+static bool whole(const char *text, uint64_t max, uint64_t *out)
+{
+    uint64_t value = 0;
+    if (*text < '0' || *text > '9') {
+        return false;
+    }
+    for (; *text >= '0' && *text <= '9'; ++text) {
+        uint64_t digit = (uint64_t)(*text - '0');
+        if (value > (UINT64_MAX - digit) / 10) {
+            return false;
+        }
+        value = value * 10 + digit;
+    }
+    uint64_t scale = *text == 'k' ? 1000 : *text == 'M' ? 1000000 : 1;
+    text += scale > 1 ? 1 : 0;
+    *out = value <= UINT64_MAX / scale ? value * scale : UINT64_MAX;
+    return *text == '\0' && *out <= max;
+}
+
+static bool count(const char *text, uint32_t min, uint32_t max, uint32_t *out)
+{
+    uint64_t value;
+    if (!whole(text, max, &value) || value < min) {
+        return false;
+    }
+    *out = (uint32_t)value;
+    return true;
+}
+
+static bool size(const char *text, uint32_t max, uint32_t *width, uint32_t *height)
+{
+    char first[16];
+    const char *cross = strchr(text, 'x');
+    size_t length = cross ? (size_t)(cross - text) : sizeof first;
+    if (length >= sizeof first) {
+        return false;
+    }
+    memcpy(first, text, length);
+    first[length] = '\0';
+    return count(first, 1, max, width) && count(cross + 1, 1, max, height);
+}
+
+static const char *read_eye(options *o, const char *text)
+{
+    return point(text, o->eye);
+}
+
+static const char *read_target(options *o, const char *text)
+{
+    return point(text, o->target);
+}
+
+static const char *read_up(options *o, const char *text)
+{
+    static const char axes[] = "xyz";
+    const char *axis = strlen(text) == 1 ? strchr(axes, text[0]) : NULL;
+    if (axis) {
+        o->up[0] = o->up[1] = o->up[2] = 0.0;
+        o->up[axis - axes] = 1.0;
+        return NULL;
+    }
+    if (point(text, o->up) || (o->up[0] == 0.0 && o->up[1] == 0.0 && o->up[2] == 0.0)) {
+        return "x, y, z or three numbers X,Y,Z that are not all zero";
+    }
+    return NULL;
+}
+
+static const char *read_fov(options *o, const char *text)
+{
+    return number(text, &o->fov) || !(o->fov > 0.0 && o->fov < 180.0) ? "degrees between 0 and 180" : NULL;
+}
+
+static const char *read_ortho(options *o, const char *text)
+{
+    return number(text, &o->ortho_height) || !(o->ortho_height > 0.0) ? "a height above 0" : NULL;
+}
+
+static const char *read_size(options *o, const char *text)
+{
+    return size(text, 32768, &o->width, &o->height) ? NULL : "WxH, both from 1 to 32768";
+}
+
+static const char *read_near(options *o, const char *text)
+{
+    return number(text, &o->near_depth);
+}
+
+static const char *read_far(options *o, const char *text)
+{
+    if (strcmp(text, "inf") == 0) {
+        o->far_depth = INFINITY;
+        return NULL;
+    }
+    return number(text, &o->far_depth) ? "a number, or inf" : NULL;
+}
+
+static const char *read_path(options *o, const char *text)
+{
+    o->path = text;
+    return *text ? NULL : "a file or gen:NAME,key=value";
+}
+
+static const char *read_row(options *o, const char *text)
+{
+    return count(text, 0, UINT32_MAX - 1, &o->row) ? NULL : "a row number, from 0";
+}
+
+static const char *read_from(options *o, const char *text)
+{
+    return count(text, 0, UINT32_MAX - 1, &o->from) ? NULL : "a row number, from 0";
+}
+
+static const char *read_to(options *o, const char *text)
+{
+    return count(text, 0, UINT32_MAX - 1, &o->to) ? NULL : "a row number, from 0";
+}
+
+static const char *read_every(options *o, const char *text)
+{
+    return count(text, 1, UINT32_MAX - 1, &o->every) ? NULL : "a whole number from 1";
+}
+
+static const char *read_method(options *o, const char *text)
+{
+    for (int m = UMB_METHOD_RASTER; m <= UMB_METHOD_NONE; ++m) {
+        if (strcmp(text, umb_method_name((umb_method)m)) == 0) {
+            o->method = (umb_method)m;
+            return NULL;
+        }
+    }
+    return "one of raster, none";
+}
+
+static const char *read_index(options *o, const char *text)
+{
+    for (int k = UMB_INDEX_BVH; k <= UMB_INDEX_FLAT; ++k) {
+        if (strcmp(text, umb_index_kind_name((umb_index_kind)k)) == 0) {
+            o->index = (umb_index_kind)k;
+            return NULL;
+        }
+    }
+    return "one of bvh, flat";
+}
+
+static const char *read_isa(options *o, const char *text)
+{
+    static const char *const names[] = {"auto", "scalar", "sse4", "avx2", "neon"};
+    for (int i = 0; i < 5; ++i) {
+        if (strcmp(text, names[i]) == 0) {
+            o->isa = (umb_isa)i;
+            return umb_isa_available(o->isa) ? NULL : "another: this machine or build does not have it";
+        }
+    }
+    return "one of auto, scalar, sse4, avx2, neon";
+}
+
+static const char *read_threads(options *o, const char *text)
+{
+    return count(text, 1, 256, &o->threads) ? NULL : "a whole number from 1 to 256";
+}
+
+static const char *read_buffer(options *o, const char *text)
+{
+    return size(text, 8192, &o->buffer_width, &o->buffer_height) ? NULL : "WxH, both from 1 to 8192";
+}
+
+static const char *read_min_pixels(options *o, const char *text)
+{
+    return number(text, &o->min_pixels) || !(o->min_pixels >= 0.0) ? "a number from 0" : NULL;
+}
+
+static const char *read_split(options *o, const char *text)
+{
+    return count(text, 1, 1u << 30, &o->model.split) ? NULL : "a number of triangles from 1";
+}
+
+static const char *read_two_sided(options *o, const char *text)
+{
+    (void)text;
+    o->model.two_sided = true;
+    return NULL;
+}
+
+static const char *read_sky(options *o, const char *text)
+{
+    (void)text;
+    o->model.sky = true;
+    return NULL;
+}
+
+static const char *read_seed(options *o, const char *text)
+{
+    uint32_t value;
+    o->seed = text;
+    return count(text, 0, UINT32_MAX, &value) ? NULL : "a whole number from 0 to 4294967295";
+}
+
+static const char *read_repeat(options *o, const char *text)
+{
+    return count(text, 1, 100000, &o->repeat) ? NULL : "a whole number from 1 to 100000";
+}
+
+static const char *read_grid(options *o, const char *text)
+{
+    return size(text, 32768, &o->grid_width, &o->grid_height) ? NULL : "WxH, both from 1 to 32768";
+}
+
+static const char *read_rays(options *o, const char *text)
+{
+    return whole(text, (uint64_t)1 << 40, &o->rays) && o->rays > 0 ? NULL : "a number of rays from 1";
+}
+
+static const char *read_object(options *o, const char *text)
+{
+    return count(text, 0, UINT32_MAX - 1, &o->object) ? NULL : "an object's number, from 0";
+}
+
+static const char *read_output(options *o, const char *text)
+{
+    o->output = text;
+    return *text ? NULL : "a file name";
+}
+
+/* Only that it was given matters. */
+static const char *read_flag(options *o, const char *text)
+{
+    (void)o;
+    (void)text;
+    return NULL;
+}
+
+/* ---- the table ------------------------------------------------------------------------------ */
+
+typedef struct option_spec {
+    const char *name;
+    char letter;       /* 0: none */
+    uint32_t commands; /* who takes it */
+    const char *value; /* NULL: takes none */
+    const char *(*read)(options *o, const char *text);
+    const char *help;
+} option_spec;
+
+static const option_spec specs[] = {
+    {"eye", 0, VIEWS & ~BIT(WALK), "X,Y,Z", read_eye, "where the eye is, in the file's coordinates"},
+    {"target", 0, VIEWS & ~BIT(WALK), "X,Y,Z", read_target, "what it looks at"},
+    {"path", 0, VIEWS, "FILE", read_path, "views from a CSV file or a generator: gen:NAME,key=value"},
+    {"row", 0, ONE_VIEW, "N", read_row, "which row of the path is the view (default 0)"},
+    {"from", 0, MANY_VIEWS, "N", read_from, "first row of the path (default 0)"},
+    {"to", 0, MANY_VIEWS, "N", read_to, "last row of the path, included (default: its end)"},
+    {"every", 0, MANY_VIEWS, "N", read_every, "take every N-th row only (default 1)"},
+    {"up", 0, VIEWS, "DIR", read_up, "up: x, y, z or X,Y,Z (default: as info says)"},
+    {"fov", 0, VIEWS, "DEG", read_fov, "vertical field of view (default 60)"},
+    {"ortho", 0, VIEWS, "HEIGHT", read_ortho, "parallel lines; height of the view instead of --fov"},
+    {"size", 0, VIEWS, "WxH", read_size, "the picture, square pixels (default 1024x512)"},
+    {"near", 0, VIEWS, "D", read_near, "depth of the near plane (default 0.1)"},
+    {"far", 0, VIEWS, "D|inf", read_far, "depth of the far plane (default: the scene's farthest corner)"},
+
+    {"method", 0, VIEWS, "NAME", read_method, "raster or none: frustum only (default raster)"},
+    {"index", 0, SCENES, "NAME", read_index, "bvh or flat: no hierarchy (default bvh)"},
+    {"buffer", 0, VIEWS, "WxH", read_buffer, "the method's own raster (default 1024x288)"},
+    {"min-pixels", 0, VIEWS, "P", read_min_pixels, "drop objects under P pixels both ways (default 0: none)"},
+    {"no-weld", 0, SCENES, NULL, read_flag, "do not join touching objects into common occluders"},
+    {"threads", 0, SCENES, "N", read_threads, "threads to build and trace with (default 1)"},
+    {"isa", 0, VIEWS, "NAME", read_isa, "auto, scalar, sse4, avx2 or neon (default auto)"},
+
+    {"two-sided", 0, SCENES, NULL, read_two_sided, "faces block from both sides"},
+    {"sky", 0, SCENES, NULL, read_sky, "keep sky surfaces; they block"},
+    {"split", 0, SCENES, "N", read_split, "cut meshes into clusters of at most N triangles"},
+    {"seed", 0, SCENES | BIT(GENERATE), "N", read_seed, "seed of a generated scene and path that have one"},
+
+    {"list", 0, BIT(INFO) | BIT(CULL) | BIT(WALK), NULL, read_flag, "list the objects too"},
+    {"repeat", 0, BIT(CULL), "N", read_repeat, "answers that the time is the median of (default 5)"},
+    {"grid", 0, BIT(CHECK) | BIT(EXPLAIN), "WxH", read_grid, "first rays of the oracle (default: --size)"},
+    {"rays", 0, BIT(CHECK) | BIT(EXPLAIN), "N", read_rays, "most guided rays a view (default 4M)"},
+    {"object", 0, BIT(EXPLAIN), "ID", read_object, "the object to explain"},
+    {"output", 'o', BIT(GENERATE), "FILE", read_output, "the file to write"},
+
+    {"json", 0, ALL, NULL, read_flag, "one JSON object on one line instead of text"},
+    {"progress", 0, ALL, NULL, read_flag, "show progress though standard error is no terminal"},
+    {"help", 'h', ALL, NULL, read_flag, "this text"},
+};
+enum { SPEC_COUNT = sizeof specs / sizeof specs[0] };
+_Static_assert(SPEC_COUNT <= 64, "options.given has a bit for each");
+
+/* ---- reading -------------------------------------------------------------------------------- */
+
+int fail(const options *o, int code, const char *format, ...)
+{
+    va_list arguments;
+    fprintf(stderr, "umbrage %s: ", o->command);
+    va_start(arguments, format);
+    vfprintf(stderr, format, arguments);
+    va_end(arguments);
+    fputc('\n', stderr);
+    return code;
+}
+
+bool options_given(const options *o, const char *name)
+{
+    for (int i = 0; i < SPEC_COUNT; ++i) {
+        if (strcmp(specs[i].name, name) == 0) {
+            return (o->given >> i & 1) != 0;
+        }
+    }
+    return false;
+}
+
+/* The option that a word starting with a minus names, for this subcommand; NULL: none. *value is what
+ * follows an equals sign. */
+static const option_spec *find(const char *word, int which, const char **value)
+{
+    size_t length = strcspn(word, "=");
+    *value = word[length] == '=' ? word + length + 1 : NULL;
+    for (int i = 0; i < SPEC_COUNT; ++i) {
+        const option_spec *s = &specs[i];
+        bool named = word[1] == '-' ? length == strlen(s->name) + 2 && memcmp(word + 2, s->name, length - 2) == 0
+                                    : length == 2 && s->letter && word[1] == s->letter;
+        if (named && (s->commands >> which & 1)) {
+            return s;
+        }
+    }
+    return NULL;
+}
+
+static int read_option(const option_spec *s, const char *value, options *out)
+{
+    const char *wanted = s->read(out, value);
+    if (wanted) {
+        return fail(out, EXIT_USAGE, "--%s '%.60s': takes %s", s->name, value, wanted);
+    }
+    out->given |= (uint64_t)1 << (s - specs);
+    return EXIT_DONE;
+}
+
+static int read_input(const command *c, const char *word, options *out)
+{
+    if (out->input) {
+        return fail(out, EXIT_USAGE, "takes one %s; '%.60s' is too many", c->input, word);
+    }
+    out->input = word;
+    return EXIT_DONE;
+}
+
+static void set_defaults(const command *c, options *out)
+{
+    *out = (options){.command = c->name,
+                     .fov = 60.0,
+                     .width = 1024,
+                     .height = 512,
+                     .near_depth = 0.1,
+                     .to = UINT32_MAX,
+                     .every = 1,
+                     .threads = 1,
+                     .repeat = 5,
+                     .pictures = PICTURE_EYE};
+}
+
+int options_read(const command *c, int which, int word_count, char **words, options *out, bool *help)
+{
+    bool only_inputs = false;
+    set_defaults(c, out);
+    *help = false;
+    for (int i = 0; i < word_count; ++i) {
+        const char *word = words[i], *value;
+        int code;
+        if (only_inputs || word[0] != '-' || word[1] == '\0') {
+            code = read_input(c, word, out);
+        } else if (strcmp(word, "--") == 0) {
+            only_inputs = true;
+            code = EXIT_DONE;
+        } else {
+            const option_spec *s = find(word, which, &value);
+            if (!s) {
+                return fail(out, EXIT_USAGE, "no option '%.60s'; umbrage %s --help lists them", word, c->name);
+            }
+            if (!s->value && value) {
+                return fail(out, EXIT_USAGE, "--%s takes no value", s->name);
+            }
+            if (s->value && !value) {
+                if (++i == word_count) {
+                    return fail(out, EXIT_USAGE, "--%s needs a value: --%s %s", s->name, s->name, s->value);
+                }
+                value = words[i];
+            }
+            code = read_option(s, value, out);
+            if (strcmp(s->name, "help") == 0) {
+                *help = true;
+                return EXIT_DONE;
+            }
+        }
+        if (code != EXIT_DONE) {
+            return code;
+        }
+    }
+    if (!out->input || !*out->input) {
+        return fail(out, EXIT_USAGE, "needs a %s: umbrage %s %s %s", c->input, c->name, c->input, c->usage);
+    }
+    return EXIT_DONE;
+}
+
+void options_help(const command *c, int which)
+{
+    printf("usage: umbrage %s %s %s\n\n%s.\n\n", c->name, c->input, c->usage, c->summary);
+    for (int i = 0; i < SPEC_COUNT; ++i) {
+        const option_spec *s = &specs[i];
+        if (s->commands >> which & 1) {
+            char left[64];
+            int used = s->letter ? snprintf(left, sizeof left, "-%c, ", s->letter) : 0;
+            snprintf(left + used, sizeof left - (size_t)used, "--%s%s%s", s->name, s->value ? " " : "",
+                     s->value ? s->value : "");
+            printf("  %-20s %s\n", left, s->help);
+        }
+    }
+}

@@ -1,0 +1,306 @@
+#include "setup.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "progress.h"
+
+/* ---- scene ---------------------------------------------------------------------------------- */
+
+static bool is_generated(const char *name)
+{
+    return strncmp(name, "gen:", 4) == 0;
+}
+
+/* With --seed, a generator's name with the seed added; the last of equal keys counts. NULL without. */
+static char *seeded(const options *o, const char *name)
+{
+    if (!o->seed || !is_generated(name)) {
+        return NULL;
+    }
+    size_t length = strlen(name) + strlen(o->seed) + 8;
+    char *out = malloc(length);
+    if (out) {
+        snprintf(out, length, "%s,seed=%s", name, o->seed);
+    }
+    return out;
+}
+
+static model *load_model(const options *o, umb_error *error)
+{
+    model *m = NULL;
+    char *name = seeded(o, o->input);
+    if (name) {
+        m = model_load(name, &o->model, error);
+        free(name);
+    }
+    /* Not every generator draws numbers: one that has no seed is the same for all of them. */
+    return m ? m : model_load(o->input, &o->model, error);
+}
+
+/* A wrong name or number of a generator is wrong usage; what a file holds is an input. */
+static int load_failure(const options *o, const char *name, const umb_error *error)
+{
+    bool usage = is_generated(name) && error->code == UMB_ERROR_ARGUMENT;
+    return fail(o, usage ? EXIT_USAGE : EXIT_INPUT, "%s", error->text);
+}
+
+int setup_model(setup *s, const options *o)
+{
+    memset(s, 0, sizeof *s);
+    double start = progress_clock();
+    s->model = load_model(o, &s->error);
+    if (!s->model) {
+        return load_failure(o, o->input, &s->error);
+    }
+    s->load_ms = progress_clock() - start;
+    return EXIT_DONE;
+}
+
+int setup_scene(setup *s, const options *o)
+{
+    int code = setup_model(s, o);
+    if (code != EXIT_DONE) {
+        return code;
+    }
+    double start = progress_clock();
+    if (o->threads > 1) {
+        if (umb_pool_create(o->threads, &s->pool) != UMB_OK) {
+            return fail(o, EXIT_INPUT, "%u threads cannot be started; ask for fewer", o->threads);
+        }
+        s->tasks = umb_pool_tasks(s->pool);
+    }
+    bool weld = !options_given(o, "no-weld");
+    s->scene = model_scene(s->model, weld, s->tasks, &s->weld, &s->error);
+    if (!s->scene) {
+        return fail(o, EXIT_INPUT, "%s: %s", o->input, s->error.text);
+    }
+    umb_result result =
+        umb_index_create(s->scene, &(umb_index_def){.kind = o->index, .tasks = s->tasks}, &s->index);
+    if (result != UMB_OK) {
+        return fail(o, EXIT_INPUT, "%s: the index: %s", o->input, umb_result_name(result));
+    }
+    s->build_ms = progress_clock() - start;
+    return EXIT_DONE;
+}
+
+static int setup_cullers(setup *s, const options *o)
+{
+    int code = setup_scene(s, o);
+    if (code != EXIT_DONE) {
+        return code;
+    }
+    umb_culler_def def = {.method = o->method, .isa = o->isa, .error = &s->error};
+    umb_result result = umb_culler_create(s->index, &def, &s->culler);
+    def.method = UMB_METHOD_NONE;
+    if (result == UMB_OK) {
+        result = umb_culler_create(s->index, &def, &s->frustum);
+    }
+    return result == UMB_OK ? EXIT_DONE : fail(o, EXIT_INPUT, "the culler: %s", umb_result_name(result));
+}
+
+void setup_free(setup *s)
+{
+    umb_culler_destroy(s->frustum);
+    umb_culler_destroy(s->culler);
+    umb_index_destroy(s->index);
+    umb_scene_destroy(s->scene);
+    umb_pool_destroy(s->pool);
+    model_free(s->model);
+    memset(s, 0, sizeof *s);
+}
+
+void setup_to_file(const model *m, const double in[3], double out[3])
+{
+    for (int i = 0; i < 3; ++i) {
+        out[i] = in[i] + m->origin[i];
+    }
+}
+
+/* ---- views ---------------------------------------------------------------------------------- */
+
+/* Nothing of the scene lies deeper than the distance to the farthest corner of its box. Three exact or
+ * once-rounded differences, squares, two sums, a root, and the rounding of forward to unit length: under
+ * 12 roundings of DBL_EPSILON / 2 each, so 16 epsilons keep the corner itself in view. */
+static double farthest_corner(const model *m, const double eye[3], double near_depth)
+{
+    double square = 0.0;
+    for (int i = 0; i < 3; ++i) {
+        double reach = fmax(fabs((double)m->bounds.min[i] - eye[i]), fabs((double)m->bounds.max[i] - eye[i]));
+        square += reach * reach;
+    }
+    double distance = sqrt(square) * (1.0 + 16.0 * DBL_EPSILON);
+    return distance > near_depth ? distance : near_depth + 1.0;
+}
+
+static umb_result make_view(const setup *s, const options *o, const double row[6], umb_view *out)
+{
+    const model *m = s->model;
+    double eye[3], target[3];
+    for (int i = 0; i < 3; ++i) {
+        eye[i] = row[i] - m->origin[i];
+        target[i] = row[i + 3] - m->origin[i];
+    }
+    const double *up = options_given(o, "up") ? o->up : m->up;
+    double aspect = (double)o->width / o->height;
+    double far_depth =
+        options_given(o, "far") ? o->far_depth : farthest_corner(m, eye, o->near_depth);
+    umb_result result =
+        options_given(o, "ortho")
+            ? umb_view_look_at_ortho(out, eye, target, up, o->ortho_height, aspect, o->near_depth, far_depth)
+            : umb_view_look_at(out, eye, target, up, o->fov * (3.14159265358979323846 / 180.0), aspect,
+                               o->near_depth, far_depth);
+    if (result == UMB_OK) {
+        out->width = o->width;
+        out->height = o->height;
+        out->buffer_width = o->buffer_width;
+        out->buffer_height = o->buffer_height;
+        out->min_pixels = o->min_pixels;
+        result = umb_view_check(out, NULL);
+    }
+    return result;
+}
+
+/* In the order in which people get them wrong. */
+static const char *why_impossible(const setup *s, const options *o, const double row[6])
+{
+    bool finite = true, same = true;
+    double eye[3];
+    for (int i = 0; i < 3; ++i) {
+        eye[i] = row[i] - s->model->origin[i];
+        finite = finite && fabs(row[i]) <= 1e30 && fabs(row[i + 3]) <= 1e30;
+        same = same && eye[i] == row[i + 3] - s->model->origin[i];
+    }
+    if (!finite) {
+        return "coordinates must be finite, at most 1e30";
+    }
+    if (same) {
+        return "eye and target are the same point";
+    }
+    bool ortho = options_given(o, "ortho");
+    if (!ortho && !(o->near_depth > 0.0)) {
+        return "--near must be above 0 (below only with --ortho)";
+    }
+    if (ortho && isinf(o->far_depth)) {
+        return "--far inf needs perspective";
+    }
+    if (options_given(o, "far") && !(o->far_depth > o->near_depth)) {
+        return "--far must be above --near";
+    }
+    return "numbers too large, too small or too far apart (fov, height, size, near, far)";
+}
+
+static int check_views(const setup *s, const options *o, const views *v)
+{
+    umb_view view;
+    for (uint32_t k = 0; k < v->count; ++k) {
+        uint32_t r = setup_row(v, k);
+        if (make_view(s, o, v->path.rows[r], &view) == UMB_OK) {
+            continue;
+        }
+        const char *why = why_impossible(s, o, v->path.rows[r]);
+        return v->is_path ? fail(o, EXIT_USAGE, "impossible view: row %u of %s: %s", r, o->path, why)
+                          : fail(o, EXIT_USAGE, "impossible view: %s", why);
+    }
+    return EXIT_DONE;
+}
+
+static int load_path(const options *o, umb_error *error, views *out)
+{
+    bool loaded = false;
+    char *name = seeded(o, o->path);
+    if (name) {
+        loaded = camera_path_load(name, &out->path, error);
+        free(name);
+    }
+    if (!loaded && !camera_path_load(o->path, &out->path, error)) {
+        return load_failure(o, o->path, error);
+    }
+    out->is_path = true;
+    return out->path.count > 0 ? EXIT_DONE : fail(o, EXIT_INPUT, "%s: holds no view", o->path);
+}
+
+static int choose_rows(const options *o, bool single, views *out)
+{
+    uint32_t from = single ? o->row : o->from;
+    uint32_t last = out->path.count - 1;
+    uint32_t to = single ? from : o->to < last ? o->to : last;
+    if (from > last || to < from) {
+        return fail(o, EXIT_USAGE, "no such rows: %s has rows 0 to %u", o->path, last);
+    }
+    out->first = from;
+    out->every = o->every;
+    out->count = (to - from) / o->every + 1;
+    return EXIT_DONE;
+}
+
+static int single_row(const options *o, views *out)
+{
+    if (!options_given(o, "eye") || !options_given(o, "target")) {
+        return fail(o, EXIT_USAGE, "needs a view: --eye X,Y,Z --target X,Y,Z, or --path FILE");
+    }
+    out->path.rows = malloc(sizeof *out->path.rows);
+    if (!out->path.rows) {
+        return fail(o, EXIT_INPUT, "not enough memory");
+    }
+    memcpy(out->path.rows[0], o->eye, sizeof o->eye);
+    memcpy(out->path.rows[0] + 3, o->target, sizeof o->target);
+    out->path.count = out->count = out->every = 1;
+    return EXIT_DONE;
+}
+
+/* What contradicts itself, whatever the scene. */
+static int check_choices(const options *o)
+{
+    bool eye = options_given(o, "eye") || options_given(o, "target");
+    if (o->path && eye) {
+        return fail(o, EXIT_USAGE, "takes --eye and --target, or --path, not both");
+    }
+    if (options_given(o, "fov") && options_given(o, "ortho")) {
+        return fail(o, EXIT_USAGE, "takes --fov or --ortho, not both");
+    }
+    static const char *const row_options[] = {"row", "from", "to", "every"};
+    for (int i = 0; i < 4; ++i) {
+        if (!o->path && options_given(o, row_options[i])) {
+            return fail(o, EXIT_USAGE, "--%s needs --path", row_options[i]);
+        }
+    }
+    return EXIT_DONE;
+}
+
+/* What needs no scene is refused before one is read. */
+static int read_rows(const options *o, bool single, views *out)
+{
+    umb_error error = {0};
+    int code = check_choices(o);
+    if (code == EXIT_DONE) {
+        code = o->path ? load_path(o, &error, out) : single_row(o, out);
+    }
+    return code == EXIT_DONE && o->path ? choose_rows(o, single, out) : code;
+}
+
+int setup_views(setup *s, const options *o, bool single, views *out)
+{
+    memset(s, 0, sizeof *s);
+    memset(out, 0, sizeof *out);
+    int code = read_rows(o, single, out);
+    if (code == EXIT_DONE) {
+        code = setup_cullers(s, o);
+    }
+    return code == EXIT_DONE ? check_views(s, o, out) : code;
+}
+
+uint32_t setup_row(const views *v, uint32_t k)
+{
+    return v->first + k * v->every;
+}
+
+umb_view setup_view(const setup *s, const options *o, const views *v, uint32_t k)
+{
+    umb_view view;
+    make_view(s, o, v->path.rows[setup_row(v, k)], &view);
+    return view;
+}
