@@ -204,33 +204,57 @@ static void draw(walk *w, uint32_t occluder)
     }
 }
 
-/* The parts of the shape, when they say more than the object's box: hidden if each of them is. */
-static bool parts_hidden(walk *w, const umb_object *o, uint32_t ref)
+/* True if the parts of the shape say more than the object's box. */
+static bool refinable(const walk *w, const umb_object *o)
 {
-    if (!o->refine || w->culler->ops == NULL || (o->mesh->part_count == 1 && o->identity)) {
-        return false;
-    }
-    for (uint32_t i = 0; i < o->mesh->part_count; ++i) {
-        umb_image_bounds b;
-        if (!umb_image_of_part(&w->map, &o->mesh->parts[i], &o->transform, o->identity, &b)) {
-            return false;
-        }
-        umb_image image = umb_image_of_bounds(&w->map, &b);
-        if (!hidden(w, ref, &image)) {
-            return false;
-        }
-    }
-    return true;
+    return o->refine && w->culler->ops != NULL && (o->mesh->part_count > 1 || !o->identity);
 }
 
-static void visit_object(walk *w, const umb_waiting *item)
+/* Walk the parts: the nearest depth of those that are not hidden, INFINITY if all are. A part that
+ * crosses the near depth ends it: nothing is nearer. */
+static double nearest_part(walk *w, const umb_object *o, uint32_t ref)
+{
+    const umb_mesh *mesh = o->mesh;
+    double nearest = INFINITY;
+    for (uint32_t i = 0; i < mesh->part_count;) {
+        const umb_part *part = &mesh->parts[i];
+        bool leaf = part->skip == i + 1;
+        umb_image_bounds b;
+        umb_depth_place place = umb_image_of_part(&w->map, &part->box, &o->transform, o->identity, &b);
+        if (place == UMB_DEPTH_CROSSING && leaf) {
+            return -INFINITY;
+        }
+        bool over = place == UMB_DEPTH_OUTSIDE;
+        if (place == UMB_DEPTH_BEYOND) {
+            umb_image image = umb_image_of_bounds(&w->map, &b);
+            over = b.w_min >= nearest || hidden(w, ref, &image);
+            nearest = leaf && !over ? b.w_min : nearest;
+        }
+        i = over ? part->skip : i + 1;
+    }
+    return nearest;
+}
+
+/* An object whose turn has come. Its box may be much nearer than anything in it: then it waits again, for
+ * the turn of its nearest part, while what lies between is drawn. */
+static void visit_object(walk *w, umb_waiting *item)
 {
     umb_culler *c = w->culler;
     uint32_t id = item->ref & UMB_REF_NUMBER;
     const umb_object *o = &w->scene->objects[id];
-    if (item->testable && parts_hidden(w, o, item->ref)) {
-        w->stats.hidden_objects += 1;
-        return;
+    if (refinable(w, o) && !(item->refined && item->stamp == w->drawn)) {
+        double nearest = nearest_part(w, o, item->ref);
+        if (nearest == INFINITY) {
+            w->stats.hidden_objects += 1;
+            return;
+        }
+        if (nearest > item->key) {
+            item->key = nearest;
+            item->stamp = w->drawn;
+            item->refined = true;
+            umb_heap_push(&c->heap, item);
+            return;
+        }
     }
     c->objects[c->count] = id;
     c->inside[c->count] = item->planes == 0;

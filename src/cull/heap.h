@@ -13,6 +13,7 @@ typedef struct umb_waiting {
     umb_image image; /* meaningful if testable */
     uint16_t planes; /* frustum planes that its box may cross */
     bool testable;   /* beyond the near depth everywhere */
+    bool refined;    /* an object whose key is that of its nearest part not hidden at stamp */
 } umb_waiting;
 
 typedef struct umb_heap {

@@ -24,23 +24,25 @@ umb_image umb_image_of_bounds(const umb_raster_map *map, const umb_image_bounds 
     return image;
 }
 
-bool umb_image_of_part(const umb_raster_map *map, const umb_aabb *part, const umb_transform *transform,
-                       bool identity, umb_image_bounds *out)
+/* The corners of a box as the view sees them. slop: every vertex in the box has a world vertex within
+ * this, per axis, of its exact image. */
+static double place_corners(const umb_raster_map *map, const umb_aabb *part, const umb_transform *t,
+                            bool identity, umb_view_point corner[8])
 {
-    umb_view_point corner[8];
-    double slop = 0.0; /* a world vertex lies within this of the exact image of its position, per axis */
-    out->w_min = INFINITY;
+    const double eye[3] = {map->eye.x, map->eye.y, map->eye.z};
+    double slop = 0.0;
     for (int k = 0; k < 8; ++k) {
         double p[3], d[3];
         for (int i = 0; i < 3; ++i) {
             p[i] = (k >> i & 1) != 0 ? part->max[i] : part->min[i];
         }
-        const double eye[3] = {map->eye.x, map->eye.y, map->eye.z};
         for (int i = 0; i < 3; ++i) {
-            const float *m = transform->m[i];
-            double world = identity ? p[i] : m[0] * p[0] + m[1] * p[1] + m[2] * p[2] + m[3];
-            double size = identity ? 0.0
-                                   : fabs(m[0] * p[0]) + fabs(m[1] * p[1]) + fabs(m[2] * p[2]) + fabs(m[3]);
+            double world = p[i], size = 0.0;
+            if (!identity) {
+                const float *m = t->m[i];
+                world = m[0] * p[0] + m[1] * p[1] + m[2] * p[2] + m[3];
+                size = fabs(m[0] * p[0]) + fabs(m[1] * p[1]) + fabs(m[2] * p[2]) + fabs(m[3]);
+            }
             slop = 0x1p-23 * size > slop ? 0x1p-23 * size : slop;
             d[i] = world - eye[i];
         }
@@ -49,25 +51,38 @@ bool umb_image_of_part(const umb_raster_map *map, const umb_aabb *part, const um
         corner[k].y = umb_vec3_dot(map->y, v);
         corner[k].w = umb_vec3_dot(map->w, v);
         corner[k].reach = umb_vec3_sum_abs(v);
-        double w = corner[k].w - 8.0 * UMB_U * corner[k].reach;
-        out->w_min = w < out->w_min ? w : out->w_min;
     }
-    out->w_min -= 3.0 * slop;
-    if (!(out->w_min >= map->near_depth) || (!map->orthographic && !(out->w_min > 0.0))) {
-        return false;
+    return slop;
+}
+
+umb_depth_place umb_image_of_part(const umb_raster_map *map, const umb_aabb *part,
+                                  const umb_transform *transform, bool identity, umb_image_bounds *out)
+{
+    umb_view_point corner[8];
+    double slop = place_corners(map, part, transform, identity, corner);
+    double w_max = -INFINITY;
+    out->w_min = INFINITY;
+    for (int k = 0; k < 8; ++k) {
+        double error = 8.0 * UMB_U * corner[k].reach + 3.0 * slop;
+        out->w_min = corner[k].w - error < out->w_min ? corner[k].w - error : out->w_min;
+        w_max = corner[k].w + error > w_max ? corner[k].w + error : w_max;
+    }
+    if (w_max < map->near_depth || out->w_min > map->far_depth) {
+        return UMB_DEPTH_OUTSIDE;
+    }
+    if (!(out->w_min >= map->near_depth)) {
+        return UMB_DEPTH_CROSSING;
     }
     out->x_min = out->y_min = INFINITY;
     out->x_max = out->y_max = -INFINITY;
     for (int k = 0; k < 8; ++k) {
         umb_raster_point p = umb_raster_map_project(map, corner[k], 8.0);
-        double off = map->orthographic
-                         ? 3.0 * slop * map->scale
-                         : 3.0 * slop / out->w_min * (map->scale + fabs(p.x - map->cx) + fabs(p.y - map->cy));
-        double error = p.error + off;
+        double a = map->scale + fabs(p.x - map->cx) + fabs(p.y - map->cy);
+        double error = p.error + 3.0 * slop * (map->orthographic ? map->scale : a / out->w_min);
         out->x_min = p.x - error < out->x_min ? p.x - error : out->x_min;
         out->y_min = p.y - error < out->y_min ? p.y - error : out->y_min;
         out->x_max = p.x + error > out->x_max ? p.x + error : out->x_max;
         out->y_max = p.y + error > out->y_max ? p.y + error : out->y_max;
     }
-    return true;
+    return UMB_DEPTH_BEYOND;
 }

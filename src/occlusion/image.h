@@ -14,9 +14,15 @@ typedef struct umb_image_bounds {
  * border needs only one of the pixels that it touches. */
 umb_image umb_image_of_bounds(const umb_raster_map *map, const umb_image_bounds *b);
 
-/* Image of a shape's box under a transform, as the box it is, turned; false if some of it may be nearer
- * than the near depth. The transform moves each vertex by one rounding to float; identity: by none. */
-bool umb_image_of_part(const umb_raster_map *map, const umb_aabb *part, const umb_transform *transform,
-                       bool identity, umb_image_bounds *out);
+typedef enum umb_depth_place {
+    UMB_DEPTH_OUTSIDE, /* wholly nearer than near or beyond far: not in view */
+    UMB_DEPTH_CROSSING, /* some of it may be nearer than near; no image */
+    UMB_DEPTH_BEYOND   /* beyond near everywhere; the image is valid */
+} umb_depth_place;
+
+/* Image of a shape's box under a transform, as the box it is, turned. The transform moves each vertex by
+ * one rounding to float; identity: by none. */
+umb_depth_place umb_image_of_part(const umb_raster_map *map, const umb_aabb *part,
+                                  const umb_transform *transform, bool identity, umb_image_bounds *out);
 
 #endif

@@ -74,7 +74,7 @@ static bool reserve_silhouette(raster *r, const umb_committed *scene)
     uint32_t vertices = 0, triangles = 0, edges = 0;
     for (uint32_t i = 0; i < scene->occluder_count; ++i) {
         const umb_mesh *m = scene->occluders[i].mesh;
-        vertices = m->position_count > vertices ? m->position_count : vertices;
+        vertices = m->block_position_count > vertices ? m->block_position_count : vertices;
         triangles = m->triangle_count > triangles ? m->triangle_count : triangles;
         edges = m->edge_count > edges ? m->edge_count : edges;
     }

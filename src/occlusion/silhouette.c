@@ -52,7 +52,7 @@ static bool place_vertices(umb_silhouette *s, const umb_raster_map *map, const u
 {
     const umb_mesh *mesh = o->mesh;
     double reach = 0.0;
-    for (uint32_t v = 0; v < mesh->position_count; ++v) {
+    for (uint32_t v = 0; v < mesh->block_position_count; ++v) {
         if (o->identity) {
             memcpy(s->world[v], mesh->positions[v], sizeof s->world[v]);
         } else {
@@ -63,7 +63,7 @@ static bool place_vertices(umb_silhouette *s, const umb_raster_map *map, const u
     }
     s->cut_depth = map->near_depth + 64.0 * UMB_U * (reach + fabs(map->near_depth));
     bool any = false;
-    for (uint32_t v = 0; v < mesh->position_count; ++v) {
+    for (uint32_t v = 0; v < mesh->block_position_count; ++v) {
         if (s->views[v].w >= s->cut_depth) {
             s->points[v] = umb_raster_map_project(map, s->views[v], VERTEX_SLACK);
             any = true;

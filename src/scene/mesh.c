@@ -8,6 +8,7 @@
 #include "geometry/transform.h"
 #include "mesh_edges.h"
 #include "mesh_parts.h"
+#include "position_hash.h"
 
 #define MAX_COUNT (1u << 30)
 #define ALIGNMENT 64u
@@ -64,16 +65,6 @@ static bool all_finite(const mesh_builder *b)
     return true;
 }
 
-static uint32_t hash_position(const float p[3])
-{
-    uint32_t bits[3];
-    memcpy(bits, p, sizeof bits);
-    uint64_t h = bits[0] * 0x9E3779B97F4A7C15u;
-    h = (h ^ (h >> 32) ^ bits[1]) * 0xBF58476D1CE4E5B9u;
-    h = (h ^ (h >> 32) ^ bits[2]) * 0x94D049BB133111EBu;
-    return (uint32_t)(h >> 32);
-}
-
 /* The vertex of position i of the definition, numbered by first use. */
 static uint32_t merge_position(mesh_builder *b, uint32_t i)
 {
@@ -82,7 +73,7 @@ static uint32_t merge_position(mesh_builder *b, uint32_t i)
     }
     float p[3];
     read_position(b, i, p);
-    uint32_t slot = hash_position(p) & b->table_mask;
+    uint32_t slot = umb_position_hash(p) & b->table_mask;
     while (b->table[slot] != UMB_NONE && memcmp(b->positions[b->table[slot]], p, sizeof p) != 0) {
         slot = (slot + 1) & b->table_mask;
     }
@@ -195,14 +186,14 @@ umb_mesh *umb_mesh_allocate(const umb_allocator *allocator, const umb_mesh *size
     m->triangles = (uint32_t(*)[3])(void *)(block + triangles);
     m->two_sided = (uint8_t *)(block + two_sided);
     m->edges = (umb_edge *)(void *)(block + edges);
-    m->parts = (umb_aabb *)(void *)(block + parts);
+    m->parts = (umb_part *)(void *)(block + parts);
     m->bytes = bytes;
     return m;
 }
 
 /* Copy what was built into one block. */
 static umb_mesh *pack(const umb_allocator *allocator, const mesh_builder *b, const umb_edge *edges,
-                      uint32_t edge_count, const umb_aabb *parts, uint32_t part_count)
+                      uint32_t edge_count, const umb_part *parts, uint32_t part_count)
 {
     umb_mesh sizes = {0};
     sizes.position_count = b->position_count;
@@ -248,8 +239,8 @@ umb_result umb_mesh_create(const umb_allocator *allocator, const umb_shape_def *
         const uint32_t(*triangles)[3] = (const uint32_t(*)[3])b.triangles;
         umb_edge *edges =
             umb_mesh_edges_build(&scratch, triangles, b.two_sided, b.blocking_count, &edge_count);
-        umb_aabb whole = bounds_of((const float(*)[3])b.positions, b.position_count);
-        const umb_aabb *parts = &whole;
+        umb_part whole = {bounds_of((const float(*)[3])b.positions, b.position_count), 1};
+        const umb_part *parts = &whole;
         if (b.triangle_count > 0) {
             parts = umb_mesh_parts_build(&scratch, (const float(*)[3])b.positions, triangles,
                                          b.triangle_count, &part_count);

@@ -16,12 +16,19 @@ typedef struct umb_edge {
 
 #define UMB_EDGE_SAME 0x80000000u
 
+/* A tree of boxes in the order of a walk: the part at 0 holds all triangles; the part after part i is the
+ * first that i was cut into, unless that is skip, where the walk goes on when i is passed over. */
+typedef struct umb_part {
+    umb_aabb box;
+    uint32_t skip; /* own number + 1: a leaf */
+} umb_part;
+
 typedef struct umb_mesh {
     float (*positions)[3];
     uint32_t (*triangles)[3]; /* blocking triangles only: not OPEN, not of zero area in exact arithmetic */
     uint8_t *two_sided;       /* per blocking triangle: 1 or 0 */
     umb_edge *edges;
-    umb_aabb *parts;          /* boxes that together hold every triangle, OPEN and degenerate ones too */
+    umb_part *parts; /* hold every triangle, OPEN and degenerate ones too */
     uint32_t position_count, triangle_count, edge_count, part_count;
     uint32_t block_position_count; /* blocking triangles use positions below this; the rest is only seen */
     uint32_t any_two_sided;

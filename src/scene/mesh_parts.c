@@ -5,7 +5,7 @@
 #include "base/sort.h"
 
 #define BINS 16u
-#define MIN_SIDE 4u    /* smaller parts cost more to visit than they refine */
+#define KEEP_BELOW 0.8 /* parts must be this much smaller than what they refine */
 #define STACK_SIZE 256u /* each cut leaves at most 7/8: 8/7^256 is far beyond 2^32 */
 
 typedef struct parts_builder {
@@ -13,7 +13,8 @@ typedef struct parts_builder {
     uint32_t *order;
     uint64_t *keys, *key_scratch;
     uint32_t *value_scratch;
-    umb_aabb *parts;
+    umb_part *parts; /* in the order of a walk: a part, then the parts that it was cut into */
+    uint32_t *begins, *ends; /* per part: its range of order */
     uint32_t part_count;
 } parts_builder;
 
@@ -64,7 +65,7 @@ static uint32_t best_cut(const parts_builder *p, uint32_t begin, uint32_t end, i
         right[k - 1] = right[k];
         box_join(&right[k - 1], &boxes[k - 1]);
     }
-    uint32_t n = end - begin, least = n / 8 > MIN_SIDE ? n / 8 : MIN_SIDE;
+    uint32_t n = end - begin, least = n / 8 > 1 ? n / 8 : 1;
     uint32_t best = 0, on_left = 0;
     double best_cost = 0.0;
     umb_aabb left = box_of_none();
@@ -125,7 +126,51 @@ static void emit(parts_builder *p, uint32_t begin, uint32_t end)
     for (uint32_t i = begin + 1; i < end; ++i) {
         box_join(&box, &p->boxes[p->order[i]]);
     }
-    p->parts[p->part_count++] = box;
+    p->ends[p->part_count] = end;
+    p->begins[p->part_count] = begin;
+    p->parts[p->part_count++].box = box;
+}
+
+/* Where the walk goes on when a part is passed over: the next one that does not lie inside its range. */
+static void link_parts(parts_builder *p)
+{
+    uint32_t open[STACK_SIZE], depth = 0;
+    for (uint32_t i = 0; i < p->part_count; ++i) {
+        while (depth > 0 && p->ends[open[depth - 1]] <= p->begins[i]) {
+            p->parts[open[--depth]].skip = i;
+        }
+        open[depth++] = i;
+    }
+    while (depth > 0) {
+        p->parts[open[--depth]].skip = p->part_count;
+    }
+}
+
+/* Drop what is below a part unless its own parts together are smaller: the boxes of a solid's faces say
+ * no more than the solid's box, those of a room's walls say much more than the room's. Going backwards,
+ * children come before their parents; a negative area marks a part that becomes a leaf. */
+static void prune_parts(parts_builder *p, double *area)
+{
+    for (uint32_t i = p->part_count; i-- > 0;) {
+        const umb_part *part = &p->parts[i];
+        double own = half_area(&part->box);
+        area[i] = own;
+        if (part->skip != i + 1) {
+            uint32_t second = p->parts[i + 1].skip;
+            double below = fabs(area[i + 1]) + fabs(area[second]);
+            area[i] = below < KEEP_BELOW * own ? below : -own;
+        }
+    }
+    uint32_t kept = 0;
+    for (uint32_t i = 0; i < p->part_count;) {
+        p->begins[kept] = p->begins[i];
+        p->ends[kept] = p->ends[i];
+        p->parts[kept].box = p->parts[i].box;
+        kept += 1;
+        i = signbit(area[i]) ? p->parts[i].skip : i + 1;
+    }
+    p->part_count = kept;
+    link_parts(p);
 }
 
 static umb_aabb *triangle_boxes(umb_scratch *scratch, const float (*positions)[3],
@@ -146,7 +191,7 @@ static umb_aabb *triangle_boxes(umb_scratch *scratch, const float (*positions)[3
     return boxes;
 }
 
-umb_aabb *umb_mesh_parts_build(umb_scratch *scratch, const float (*positions)[3],
+umb_part *umb_mesh_parts_build(umb_scratch *scratch, const float (*positions)[3],
                                const uint32_t (*triangles)[3], uint32_t triangle_count, uint32_t *part_count)
 {
     umb_aabb *boxes = triangle_boxes(scratch, positions, triangles, triangle_count);
@@ -156,8 +201,11 @@ umb_aabb *umb_mesh_parts_build(umb_scratch *scratch, const float (*positions)[3]
                        umb_scratch_get(scratch, n, sizeof(uint64_t)),
                        umb_scratch_get(scratch, n, sizeof(uint64_t)),
                        umb_scratch_get(scratch, n, sizeof(uint32_t)),
-                       umb_scratch_get(scratch, n / MIN_SIDE + 1, sizeof(umb_aabb)),
+                       umb_scratch_get(scratch, 2 * n, sizeof(umb_part)),
+                       umb_scratch_get(scratch, 2 * n, sizeof(uint32_t)),
+                       umb_scratch_get(scratch, 2 * n, sizeof(uint32_t)),
                        0};
+    double *areas = umb_scratch_get(scratch, 2 * n, sizeof *areas);
     if (scratch->failed) {
         return NULL;
     }
@@ -170,8 +218,8 @@ umb_aabb *umb_mesh_parts_build(umb_scratch *scratch, const float (*positions)[3]
     while (depth > 0) {
         depth -= 1;
         uint32_t begin = stack[depth][0], end = stack[depth][1];
+        emit(&p, begin, end);
         if (end - begin <= UMB_PART_TRIANGLES) {
-            emit(&p, begin, end);
             continue;
         }
         uint32_t at = cut(&p, begin, end);
@@ -181,7 +229,12 @@ umb_aabb *umb_mesh_parts_build(umb_scratch *scratch, const float (*positions)[3]
         stack[depth + 1][1] = at;
         depth += 2;
     }
+    link_parts(&p);
+    prune_parts(&p, areas);
     *part_count = p.part_count;
+    umb_scratch_drop(scratch, p.begins);
+    umb_scratch_drop(scratch, p.ends);
+    umb_scratch_drop(scratch, areas);
     umb_scratch_drop(scratch, p.order);
     umb_scratch_drop(scratch, p.keys);
     umb_scratch_drop(scratch, p.key_scratch);

@@ -3,14 +3,14 @@
 #define UMB_MESH_PARTS_H
 
 #include "base/scratch.h"
-#include "umbrage/geometry.h"
+#include "mesh.h"
 
-/* A shape with at most this many triangles has one part. */
-#define UMB_PART_TRIANGLES 12u
+/* Parts of at most this many triangles are not cut. */
+#define UMB_PART_TRIANGLES 2u
 
 /* Cut triangles (corner indices into positions) into parts, top down. Returns an array of the scratch
  * memory; NULL when that has failed. There is at least one triangle. */
-umb_aabb *umb_mesh_parts_build(umb_scratch *scratch, const float (*positions)[3],
+umb_part *umb_mesh_parts_build(umb_scratch *scratch, const float (*positions)[3],
                                const uint32_t (*triangles)[3], uint32_t triangle_count, uint32_t *part_count);
 
 #endif
