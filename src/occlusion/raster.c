@@ -23,7 +23,7 @@ typedef struct raster {
     umb_fill fill;
     umb_silhouette silhouette;
     window_tile *window; /* one per tile of the buffer; masks all zero between draws */
-    uint8_t *wanted;     /* per tile: the occluder covers pixels that were open or farther */
+    uint8_t *wanted;     /* per tile: the occluder changes something */
     uint32_t *row;       /* one row of covered words */
     size_t window_capacity, wanted_capacity, row_capacity;
 } raster;
@@ -152,8 +152,25 @@ static void gather_tiles(raster *r, const window *w)
     }
 }
 
-/* A tile is wanted when the occluder covers something there. Its depth starts as "nearest" and each
- * triangle that may reach the tile lowers it. */
+/* A tile is wanted when the occluder covers pixels there that were open, or may cover closed ones from
+ * nearer. Its depth starts as "nearest" and each triangle that may reach it lowers it. */
+static bool want_tile(const umb_tile *tile, const uint32_t mask[UMB_TILE_HEIGHT], double most)
+{
+    uint32_t bits = 0, fresh = 0;
+    for (uint32_t i = 0; i < UMB_TILE_HEIGHT; ++i) {
+        bits |= mask[i];
+        fresh |= mask[i] & ~tile->mask[i];
+    }
+    if (fresh != 0 || bits == 0) {
+        return fresh != 0;
+    }
+    float least = tile->z[0];
+    for (uint32_t s = 1; s < 8; ++s) {
+        least = tile->z[s] < least ? tile->z[s] : least;
+    }
+    return most > least;
+}
+
 static bool want_tiles(raster *r, const window *w)
 {
     bool any = false;
@@ -161,12 +178,12 @@ static bool want_tiles(raster *r, const window *w)
         for (uint32_t tx = w->tx0; tx <= w->tx1; ++tx) {
             size_t t = (size_t)ty * r->coverage.columns + tx;
             window_tile *tile = &r->window[t];
-            uint32_t bits = 0;
-            for (uint32_t i = 0; i < UMB_TILE_HEIGHT; ++i) {
-                bits |= tile->mask[i];
+            bool wanted = want_tile(&r->coverage.tiles[t], tile->mask, r->silhouette.most);
+            r->wanted[t] = wanted;
+            any |= wanted;
+            if (!wanted) {
+                memset(tile->mask, 0, sizeof tile->mask);
             }
-            r->wanted[t] = bits != 0;
-            any |= bits != 0;
             for (uint32_t s = 0; s < 8; ++s) {
                 tile->z[s] = INFINITY;
             }

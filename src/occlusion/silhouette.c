@@ -227,12 +227,17 @@ static void add_triangle(umb_silhouette *s, const umb_raster_map *map, const fac
     umb_depth_triangle *t = &s->triangles[s->triangle_count++];
     /* Corners that the cut takes away are nearer than those it leaves. */
     t->least = INFINITY;
+    double most = -INFINITY;
     for (int i = 0; i < 3; ++i) {
         if (kept(s, corner[i])) {
             double z = vertex_nearness(map, s->views[corner[i]]);
             t->least = z < t->least ? z : t->least;
+            most = z > most ? z : most;
+        } else {
+            most = map->orthographic ? -s->cut_depth : 1.0 / s->cut_depth;
         }
     }
+    s->most = most > s->most ? most : s->most;
     if (!plane_nearness(t, map, f, s->world[corner[0]])) {
         t->gx = t->gy = 0.0;
         t->g0 = t->least;
@@ -296,6 +301,7 @@ bool umb_silhouette_find(umb_silhouette *s, const umb_raster_map *map, const umb
     s->triangle_count = 0;
     s->x_min = s->y_min = INFINITY;
     s->x_max = s->y_max = -INFINITY;
+    s->most = -INFINITY;
     if (!place_vertices(s, map, occluder)) {
         return false;
     }

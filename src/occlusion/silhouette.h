@@ -33,6 +33,7 @@ typedef struct umb_silhouette {
     umb_depth_triangle *triangles;
     uint32_t edge_count, triangle_count;
     double x_min, y_min, x_max, y_max; /* box of the image, not clamped */
+    double most; /* nearness of the nearest point that is kept, about */
     /* scratch, one per vertex or triangle of the largest mesh */
     umb_view_point *views;
     umb_raster_point *points;
