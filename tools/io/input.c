@@ -83,7 +83,8 @@ static int find_maps(unzFile zip, char *names, size_t size, unz_file_pos *place)
     names[0] = '\0';
     for (int step = unzGoToFirstFile(zip); step == UNZ_OK; step = unzGoToNextFile(zip)) {
         char name[256];
-        if (unzGetCurrentFileInfo(zip, NULL, name, sizeof name, NULL, 0, NULL, 0) != UNZ_OK) {
+        unz_file_info info; /* some versions of minizip write it whether asked to or not */
+        if (unzGetCurrentFileInfo(zip, &info, name, sizeof name, NULL, 0, NULL, 0) != UNZ_OK) {
             break;
         }
         name[sizeof name - 1] = '\0';
