@@ -193,6 +193,59 @@ static void test_touching(void **state)
     assert_true(t.unsure > 10000);
 }
 
+/* Each plane by itself, where single terms of the bound matter most: boxes a few floats from an eye that
+ * is far from the origin and between floats; and planes of any offset, touched. */
+static void test_each_plane(void **state)
+{
+    (void)state;
+    uint64_t seed = 7;
+    const umb_box_kernels *k = umb_box_kernels_get(UMB_ISA_AUTO);
+    uint64_t outside = 0, dropped = 0;
+    for (int i = 0; i < 40000; ++i) {
+        umb_view v = random_view(&seed, 10.0);
+        v.plane_count = 0;
+        umb_aabb boxes[8];
+        double size = pow(10.0, random_in(&seed, -3, 7));
+        if (i % 2 == 0) {
+            for (int a = 0; a < 3; ++a) {
+                v.eye[a] = random_in(&seed, -size, size);
+            }
+        }
+        double step = size * 0x1p-24;
+        double depth = i % 4 == 0 ? step : v.near_depth;
+        v.far_depth = depth + v.far_depth - v.near_depth;
+        v.near_depth = depth;
+        for (uint32_t s = 0; s < 8; ++s) {
+            if (i % 2 == 0) {
+                for (int a = 0; a < 3; ++a) {
+                    boxes[s].min[a] = (float)(v.eye[a] + step * random_in(&seed, -8, 8));
+                    boxes[s].max[a] = boxes[s].min[a];
+                }
+            } else {
+                touch(&seed, &v, &boxes[s]);
+            }
+        }
+        umb_frustum f;
+        umb_frustum_prepare(&f, &v);
+        umb_node node = node_of(boxes, 8);
+        for (uint32_t p = 0; p < f.plane_count; ++p) {
+            uint16_t left[8];
+            uint32_t out = umb_frustum_test_node(&f, k, &node, (uint16_t)(1u << p), NULL, left);
+            for (uint32_t s = 0; s < 8; ++s) {
+                reference r[UMB_FRUSTUM_PLANES];
+                references(&v, &boxes[s], r);
+                long double blur = 0x1p-58L * r[p].size;
+                bool is_out = (out >> s & 1u) != 0;
+                assert_true(!is_out || r[p].most < blur);
+                assert_true(is_out || left[s] != 0 || r[p].least > -blur);
+                outside += is_out;
+                dropped += !is_out && left[s] == 0;
+            }
+        }
+    }
+    assert_true(outside > 100000 && dropped > 100000);
+}
+
 /* Exactly representable: an eye at whole numbers looking along an axis, slopes 1. Touching faces, edges
  * and corners are inside, one unit in the last place further is outside or unsure, never wrong. */
 static void test_exact_touch(void **state)
@@ -391,6 +444,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_random),
         cmocka_unit_test(test_touching),
+        cmocka_unit_test(test_each_plane),
         cmocka_unit_test(test_exact_touch),
         cmocka_unit_test(test_masking_and_coherency),
         cmocka_unit_test(test_masks_down_a_tree),
