@@ -5,10 +5,10 @@
 #include "picture.h"
 #include "picture_rays.h"
 
-static const image_color horizon = 0xE4ECF0, zenith = 0x86A9C8, below = 0xCBD0CF, line_color = 0x20242B;
+static const bitmap_color horizon = 0xE4ECF0, zenith = 0x86A9C8, below = 0xCBD0CF, line_color = 0x20242B;
 
 /* Quiet stone, sand, slate and leaf. */
-static const image_color object_colors[] = {0xE2D8C3, 0xD6C2A2, 0xC8B79A, 0xB9C6BA, 0xA9BDC8, 0xC6CEDA,
+static const bitmap_color object_colors[] = {0xE2D8C3, 0xD6C2A2, 0xC8B79A, 0xB9C6BA, 0xA9BDC8, 0xC6CEDA,
                                             0xD9BCA8, 0xBFAA9F, 0xC8CCB2, 0xE3D6B6, 0xBAB4C6, 0xA8BAA9};
 
 typedef struct shader {
@@ -26,30 +26,30 @@ static double dot(const double a[3], const double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-static image_color sky(const shader *s, const double direction[3])
+static bitmap_color sky(const shader *s, const double direction[3])
 {
     double rise = dot(direction, s->up);
-    return rise < 0 ? image_mix(horizon, below, fmin(1, -4 * rise))
-                    : image_mix(horizon, zenith, fmin(1, pow(1.4 * rise, 0.7)));
+    return rise < 0 ? bitmap_mix(horizon, below, fmin(1, -4 * rise))
+                    : bitmap_mix(horizon, zenith, fmin(1, pow(1.4 * rise, 0.7)));
 }
 
 /* A quiet tint of its own for each object; where objects share faces, by the way that a face looks. */
-static image_color surface_color(const shader *s, const picture_hit *hit)
+static bitmap_color surface_color(const shader *s, const picture_hit *hit)
 {
-    static const image_color neutral = 0xE4DED2, stone = 0xD9CDB8, slate = 0xC3CCD2;
+    static const bitmap_color neutral = 0xE4DED2, stone = 0xD9CDB8, slate = 0xC3CCD2;
     if (s->shared) {
         double turn = 0;
         for (int i = 0; i < 3; ++i) {
             turn += hit->normal[i] * (s->sun[i] - s->up[i] * dot(s->sun, s->up));
         }
-        return image_mix(neutral, turn > 0 ? stone : slate, fmin(1, 1.6 * fabs(turn)));
+        return bitmap_mix(neutral, turn > 0 ? stone : slate, fmin(1, 1.6 * fabs(turn)));
     }
     uint32_t h = (hit->object ^ hit->object >> 7) * 2654435761u >> 16;
-    return image_mix(object_colors[h % (sizeof object_colors / sizeof object_colors[0])], neutral, 0.35);
+    return bitmap_mix(object_colors[h % (sizeof object_colors / sizeof object_colors[0])], neutral, 0.35);
 }
 
 /* Light from the viewer's side, from above and from a sun, so that no two walls of a corner look alike. */
-static image_color shade(const shader *s, const picture_hit *hit, double x, double y)
+static bitmap_color shade(const shader *s, const picture_hit *hit, double x, double y)
 {
     double direction[3], normal[3] = {hit->normal[0], hit->normal[1], hit->normal[2]}, height = 0;
     picture_rays_direction(s->view, x, y, direction);
@@ -63,10 +63,10 @@ static image_color shade(const shader *s, const picture_hit *hit, double x, doub
     double light = 0.46 + 0.20 * -dot(normal, direction) + 0.12 * (0.5 + 0.5 * dot(normal, s->up)) +
                    0.34 * fmax(0, dot(normal, s->sun));
     double level = fmin(1, fmax(0, (height - s->low) / (s->high - s->low + 1e-30)));
-    image_color c = surface_color(s, hit);
-    c = image_mix(c, level < 0.5 ? 0xB9A78C : 0xF4F1EA, 0.22 * fabs(2 * level - 1));
-    c = image_mix(0x262C3A, c, fmin(1, light));
-    return image_mix(c, horizon, 0.8 * (1 - exp(-hit->depth / s->haze)));
+    bitmap_color c = surface_color(s, hit);
+    c = bitmap_mix(c, level < 0.5 ? 0xB9A78C : 0xF4F1EA, 0.22 * fabs(2 * level - 1));
+    c = bitmap_mix(0x262C3A, c, fmin(1, light));
+    return bitmap_mix(c, horizon, 0.8 * (1 - exp(-hit->depth / s->haze)));
 }
 
 /* How differently two neighbouring pixels look: 0 alike, 1 a fold of a surface, 2 another object, 3 an
@@ -104,14 +104,14 @@ static int edge_at(const picture_rays *r, uint32_t x, uint32_t y, bool shared, b
 }
 
 /* The mean of a fine grid of rays over a pixel. */
-static image_color refine(const shader *s, uint32_t x, uint32_t y, const image *im)
+static bitmap_color refine(const shader *s, uint32_t x, uint32_t y, const bitmap *im)
 {
     enum { GRID = 3 };
     uint32_t sum[3] = {GRID * GRID / 2, GRID * GRID / 2, GRID * GRID / 2};
     for (int k = 0; k < GRID * GRID; ++k) {
         double u = (x + (k % GRID + 0.5) / GRID) / im->width, v = (y + (k / GRID + 0.5) / GRID) / im->height;
         picture_hit hit = picture_rays_one(s->t, s->view, u, v);
-        image_color c = shade(s, &hit, u, v);
+        bitmap_color c = shade(s, &hit, u, v);
         for (int i = 0; i < 3; ++i) {
             sum[i] += c >> (16 - 8 * i) & 255;
         }
@@ -152,7 +152,7 @@ static shader make_shader(const model *m, truth *t, const umb_view *view)
     return s;
 }
 
-bool picture_eye(image *im, const model *m, truth *t, const umb_view *view)
+bool picture_eye(bitmap *im, const model *m, truth *t, const umb_view *view)
 {
     static const double line_strength[4] = {0, 0.10, 0.22, 0.42};
     shader s = make_shader(m, t, view);
@@ -164,10 +164,10 @@ bool picture_eye(image *im, const model *m, truth *t, const umb_view *view)
         for (uint32_t x = 0; x < im->width; ++x) {
             const picture_hit *hit = rays.hits + (size_t)y * rays.width + x;
             double u = (x + 0.5) / im->width, v = (y + 0.5) / im->height;
-            image_color c = edge_at(&rays, x, y, s.shared, true) ? refine(&s, x, y, im) : shade(&s, hit, u, v);
+            bitmap_color c = edge_at(&rays, x, y, s.shared, true) ? refine(&s, x, y, im) : shade(&s, hit, u, v);
             int edge = edge_at(&rays, x, y, s.shared, false);
             double fade = exp(-2 * (hit->object == MODEL_NONE ? 0 : hit->depth) / s.haze);
-            image_set(im, (int)x, (int)y, image_mix(c, line_color, line_strength[edge] * (0.35 + 0.65 * fade)));
+            bitmap_set(im, (int)x, (int)y, bitmap_mix(c, line_color, line_strength[edge] * (0.35 + 0.65 * fade)));
         }
     }
     picture_rays_free(&rays);

@@ -7,8 +7,8 @@
 
 enum { FINE = 2 }; /* samples to a pixel, each way */
 
-static const image_color paper = 0xF7F5F0, ink = 0x2B2D33, wedge_color = 0xF2B705;
-static const image_color state_colors[3] = {0xCDD1D6, 0xE58A6B, 0x1F8A85};
+static const bitmap_color paper = 0xF7F5F0, ink = 0x2B2D33, wedge_color = 0xF2B705;
+static const bitmap_color state_colors[3] = {0xCDD1D6, 0xE58A6B, 0x1F8A85};
 static const char *const state_names[3] = {"outside the view", "hidden", "visible"};
 
 /* What lies under a fine pixel. */
@@ -301,21 +301,21 @@ static bool on_outline(const map *p, uint32_t x, uint32_t y)
            (y + 1 < p->height && at[p->width].object != at->object);
 }
 
-static void paint(const map *p, image *fine)
+static void paint(const map *p, bitmap *fine)
 {
     for (uint32_t y = 0; y < p->height; ++y) {
         for (uint32_t x = 0; x < p->width; ++x) {
             const map_pixel *at = p->pixels + (size_t)y * p->width + x;
             bool edge = on_outline(p, x, y);
             if (at->object == MODEL_NONE) {
-                image_blend(fine, (int)x, (int)y, ink, edge ? 0.3 : 0);
+                bitmap_blend(fine, (int)x, (int)y, ink, edge ? 0.3 : 0);
                 continue;
             }
             double rise = fmin(1, fmax(0, (at->height - p->low) / (fmin(p->high, p->cut) - p->low + 1e-30)));
-            image_color c = state_colors[p->states[shown(p, at)]];
-            c = image_mix(c, 0xFFFFFF, 0.30 * rise);
-            c = image_mix(c, ink, 0.55 * (1 - at->light / 255.0));
-            image_set(fine, (int)x, (int)y, edge ? image_mix(c, ink, 0.35) : c);
+            bitmap_color c = state_colors[p->states[shown(p, at)]];
+            c = bitmap_mix(c, 0xFFFFFF, 0.30 * rise);
+            c = bitmap_mix(c, ink, 0.55 * (1 - at->light / 255.0));
+            bitmap_set(fine, (int)x, (int)y, edge ? bitmap_mix(c, ink, 0.35) : c);
         }
     }
 }
@@ -371,24 +371,24 @@ static uint32_t wedge(const map *p, double outline[9][2])
     return hull(points, 9, outline);
 }
 
-static void draw_wedge(const map *p, image *im)
+static void draw_wedge(const map *p, bitmap *im)
 {
     double outline[9][2];
     uint32_t n = wedge(p, outline);
     for (uint32_t k = 0; k < n; ++k) {
         const double *a = outline[k], *b = outline[(k + 1) % n];
-        image_line(im, a[0] / FINE, a[1] / FINE, b[0] / FINE, b[1] / FINE, 4, 0xFFFFFF, 0.45);
-        image_line(im, a[0] / FINE, a[1] / FINE, b[0] / FINE, b[1] / FINE, 1.8, ink, 0.9);
+        bitmap_line(im, a[0] / FINE, a[1] / FINE, b[0] / FINE, b[1] / FINE, 4, 0xFFFFFF, 0.45);
+        bitmap_line(im, a[0] / FINE, a[1] / FINE, b[0] / FINE, b[1] / FINE, 1.8, ink, 0.9);
     }
 }
 
-static void draw_eye(const map *p, image *im)
+static void draw_eye(const map *p, bitmap *im)
 {
     double eye[3];
     place(p, p->view->eye, eye);
-    image_disc(im, eye[0] / FINE, eye[1] / FINE, 7.5, 0xFFFFFF, 1);
-    image_disc(im, eye[0] / FINE, eye[1] / FINE, 6, ink, 1);
-    image_disc(im, eye[0] / FINE, eye[1] / FINE, 2.5, wedge_color, 1);
+    bitmap_disc(im, eye[0] / FINE, eye[1] / FINE, 7.5, 0xFFFFFF, 1);
+    bitmap_disc(im, eye[0] / FINE, eye[1] / FINE, 6, ink, 1);
+    bitmap_disc(im, eye[0] / FINE, eye[1] / FINE, 2.5, wedge_color, 1);
 }
 
 /* 1, 2 or 5 times a power of ten, at most length. */
@@ -399,7 +399,7 @@ static double round_length(double length)
 }
 
 /* The corner of the picture where a rectangle covers least of the map; the eye counts for a lot. */
-static void choose_corner(const map *p, const image *im, int wide, int tall, int margin, int *x, int *y)
+static void choose_corner(const map *p, const bitmap *im, int wide, int tall, int margin, int *x, int *y)
 {
     double least = INFINITY, eye[3];
     place(p, p->view->eye, eye);
@@ -421,13 +421,13 @@ static void choose_corner(const map *p, const image *im, int wide, int tall, int
     }
 }
 
-static void draw_legend(const map *p, image *im, const uint8_t *states)
+static void draw_legend(const map *p, bitmap *im, const uint8_t *states)
 {
     uint32_t counts[3] = {0};
     for (uint32_t o = 0; o < p->m->object_count; ++o) {
         counts[states[o]] += p->m->objects[o].mesh != MODEL_NONE;
     }
-    int s = im->width >= 800 ? 2 : 1, line = image_text_height(s) + 2 * s, pad = 6 * s, wide = 0;
+    int s = im->width >= 800 ? 2 : 1, line = bitmap_text_height(s) + 2 * s, pad = 6 * s, wide = 0;
     char text[4][64];
     double bar = round_length(im->width * 0.18 * FINE / p->scale), bar_pixels = bar * p->scale / FINE;
     for (int k = 0; k < 3; ++k) {
@@ -435,31 +435,31 @@ static void draw_legend(const map *p, image *im, const uint8_t *states)
     }
     snprintf(text[3], sizeof text[3], "%g", bar);
     for (int k = 0; k < 4; ++k) {
-        int w = image_text_width(text[k], s) + (k < 3 ? 14 * s : 4 * s + (int)bar_pixels);
+        int w = bitmap_text_width(text[k], s) + (k < 3 ? 14 * s : 4 * s + (int)bar_pixels);
         wide = w > wide ? w : wide;
     }
-    int tall = 3 * line + 8 * s + 2 * pad, x, y;
+    int tall = 3 * line + 8 * s + 2 * pad, x = 0, y = 0;
     wide += 2 * pad;
     choose_corner(p, im, wide, tall, pad, &x, &y);
-    image_rectangle(im, x, y, wide, tall, 0xFFFFFF, 0.88);
-    image_frame(im, x, y, wide, tall, 1, image_mix(paper, ink, 0.35));
+    bitmap_rectangle(im, x, y, wide, tall, 0xFFFFFF, 0.88);
+    bitmap_frame(im, x, y, wide, tall, 1, bitmap_mix(paper, ink, 0.35));
     x += pad;
     y += pad;
     for (int k = 0; k < 3; ++k, y += line) {
-        image_rectangle(im, x, y, 9 * s, 8 * s, state_colors[2 - k], 1);
-        image_frame(im, x, y, 9 * s, 8 * s, 1, image_mix(state_colors[2 - k], ink, 0.4));
-        image_text(im, x + 14 * s, y, s, text[k], ink);
+        bitmap_rectangle(im, x, y, 9 * s, 8 * s, state_colors[2 - k], 1);
+        bitmap_frame(im, x, y, 9 * s, 8 * s, 1, bitmap_mix(state_colors[2 - k], ink, 0.4));
+        bitmap_text(im, x + 14 * s, y, s, text[k], ink);
     }
-    image_rectangle(im, x, y + 4 * s, (int)bar_pixels, s, ink, 1);
-    image_rectangle(im, x, y + 2 * s, s, 5 * s, ink, 1);
-    image_rectangle(im, x + (int)bar_pixels - s, y + 2 * s, s, 5 * s, ink, 1);
-    image_text(im, x + (int)bar_pixels + 4 * s, y, s, text[3], ink);
+    bitmap_rectangle(im, x, y + 4 * s, (int)bar_pixels, s, ink, 1);
+    bitmap_rectangle(im, x, y + 2 * s, s, 5 * s, ink, 1);
+    bitmap_rectangle(im, x + (int)bar_pixels - s, y + 2 * s, s, 5 * s, ink, 1);
+    bitmap_text(im, x + (int)bar_pixels + 4 * s, y, s, text[3], ink);
 }
 
-bool picture_map(image *im, const model *m, const umb_view *view, const uint8_t *states)
+bool picture_map(bitmap *im, const model *m, const umb_view *view, const uint8_t *states)
 {
     map p = {.m = m, .view = view, .states = states};
-    image fine = {0};
+    bitmap fine = {0};
     double outline[9][2];
     choose_axes(&p);
     if (!choose_window(&p, im->width, im->height)) {
@@ -467,7 +467,7 @@ bool picture_map(image *im, const model *m, const umb_view *view, const uint8_t 
     }
     size_t count = (size_t)p.width * p.height;
     p.pixels = malloc(count * sizeof *p.pixels);
-    if (!p.pixels || !image_create(&fine, p.width, p.height)) {
+    if (!p.pixels || !bitmap_create(&fine, p.width, p.height)) {
         free(p.pixels);
         return false;
     }
@@ -481,15 +481,15 @@ bool picture_map(image *im, const model *m, const umb_view *view, const uint8_t 
             draw_object(&p, o);
         }
     }
-    image_fill(&fine, paper);
+    bitmap_fill(&fine, paper);
     uint32_t corners = wedge(&p, outline);
-    image_polygon(&fine, (const double(*)[2])outline, corners, wedge_color, 0.25);
+    bitmap_polygon(&fine, (const double(*)[2])outline, corners, wedge_color, 0.25);
     paint(&p, &fine);
-    image_shrink(im, &fine, FINE);
+    bitmap_shrink(im, &fine, FINE);
     draw_wedge(&p, im);
     draw_eye(&p, im);
     draw_legend(&p, im, states);
     free(p.pixels);
-    image_free(&fine);
+    bitmap_free(&fine);
     return true;
 }

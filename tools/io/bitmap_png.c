@@ -1,12 +1,12 @@
 #include <png.h>
 #include <setjmp.h>
 
-#include "image.h"
+#include "bitmap.h"
 #include "model_parts.h"
 #include "output.h"
 
 /* libpng reports through longjmp, so nothing that changes lives in this frame. */
-static bool write_rows(FILE *f, const image *im)
+static bool write_rows(FILE *f, const bitmap *im)
 {
     png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, NULL, NULL, NULL);
     png_infop info = png ? png_create_info_struct(png) : NULL;
@@ -30,7 +30,7 @@ static bool write_rows(FILE *f, const image *im)
     return true;
 }
 
-bool image_write_png(const image *im, const char *file, umb_error *error)
+bool bitmap_write_png(const bitmap *im, const char *file, umb_error *error)
 {
     FILE *f = output_open(file, error);
     if (!f) {

@@ -1,5 +1,5 @@
 /* Text on pictures, by stb_easy_font: letters of axis-aligned quadrilaterals. */
-#include "image.h"
+#include "bitmap.h"
 
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wunused-function"
@@ -16,7 +16,7 @@ static void copy_ascii(char *to, size_t size, const char *text)
     to[k] = 0;
 }
 
-void image_text(image *im, int x, int y, int scale, const char *text, image_color color)
+void bitmap_text(bitmap *im, int x, int y, int scale, const char *text, bitmap_color color)
 {
     enum { LONGEST = 160, VERTEX = 4, QUAD = 4 * VERTEX, QUADS_A_LETTER = 12 };
     char copy[LONGEST];
@@ -25,19 +25,19 @@ void image_text(image *im, int x, int y, int scale, const char *text, image_colo
     int count = stb_easy_font_print(0, 0, copy, NULL, quads, (int)sizeof quads);
     for (int k = 0; k < count; ++k) {
         const float *a = quads + k * QUAD, *c = a + 2 * VERTEX;
-        image_rectangle(im, x + (int)a[0] * scale, y + (int)a[1] * scale, (int)(c[0] - a[0]) * scale,
+        bitmap_rectangle(im, x + (int)a[0] * scale, y + (int)a[1] * scale, (int)(c[0] - a[0]) * scale,
                         (int)(c[1] - a[1]) * scale, color, 1.0);
     }
 }
 
-int image_text_width(const char *text, int scale)
+int bitmap_text_width(const char *text, int scale)
 {
     char copy[160];
     copy_ascii(copy, sizeof copy, text);
     return stb_easy_font_width(copy) * scale;
 }
 
-int image_text_height(int scale)
+int bitmap_text_height(int scale)
 {
     return 12 * scale;
 }

@@ -1,10 +1,10 @@
-#include "image.h"
+#include "bitmap.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-bool image_create(image *im, uint32_t width, uint32_t height)
+bool bitmap_create(bitmap *im, uint32_t width, uint32_t height)
 {
     enum { LARGEST = 32768 };
     memset(im, 0, sizeof *im);
@@ -20,24 +20,24 @@ bool image_create(image *im, uint32_t width, uint32_t height)
     return true;
 }
 
-void image_free(image *im)
+void bitmap_free(bitmap *im)
 {
     free(im->pixels);
     memset(im, 0, sizeof *im);
 }
 
-image_color image_mix(image_color a, image_color b, double t)
+bitmap_color bitmap_mix(bitmap_color a, bitmap_color b, double t)
 {
-    image_color out = 0;
+    bitmap_color out = 0;
     t = t < 0.0 ? 0.0 : t > 1.0 ? 1.0 : t;
     for (int shift = 0; shift < 24; shift += 8) {
         double x = a >> shift & 255, y = b >> shift & 255;
-        out |= (image_color)(x + (y - x) * t + 0.5) << shift;
+        out |= (bitmap_color)(x + (y - x) * t + 0.5) << shift;
     }
     return out;
 }
 
-static uint8_t *pixel(const image *im, int x, int y)
+static uint8_t *pixel(const bitmap *im, int x, int y)
 {
     if (x < 0 || y < 0 || (uint32_t)x >= im->width || (uint32_t)y >= im->height) {
         return NULL;
@@ -45,7 +45,7 @@ static uint8_t *pixel(const image *im, int x, int y)
     return im->pixels + 3 * ((size_t)y * im->width + (size_t)x);
 }
 
-void image_set(image *im, int x, int y, image_color color)
+void bitmap_set(bitmap *im, int x, int y, bitmap_color color)
 {
     uint8_t *p = pixel(im, x, y);
     if (p) {
@@ -55,41 +55,41 @@ void image_set(image *im, int x, int y, image_color color)
     }
 }
 
-image_color image_get(const image *im, int x, int y)
+bitmap_color bitmap_get(const bitmap *im, int x, int y)
 {
     const uint8_t *p = pixel(im, x, y);
-    return p ? (image_color)p[0] << 16 | (image_color)p[1] << 8 | p[2] : 0;
+    return p ? (bitmap_color)p[0] << 16 | (bitmap_color)p[1] << 8 | p[2] : 0;
 }
 
-void image_blend(image *im, int x, int y, image_color color, double opacity)
+void bitmap_blend(bitmap *im, int x, int y, bitmap_color color, double opacity)
 {
     if (opacity > 0.0) {
-        image_set(im, x, y, image_mix(image_get(im, x, y), color, opacity));
+        bitmap_set(im, x, y, bitmap_mix(bitmap_get(im, x, y), color, opacity));
     }
 }
 
-void image_fill(image *im, image_color color)
+void bitmap_fill(bitmap *im, bitmap_color color)
 {
-    image_rectangle(im, 0, 0, (int)im->width, (int)im->height, color, 1.0);
+    bitmap_rectangle(im, 0, 0, (int)im->width, (int)im->height, color, 1.0);
 }
 
-void image_rectangle(image *im, int x, int y, int width, int height, image_color color, double opacity)
+void bitmap_rectangle(bitmap *im, int x, int y, int width, int height, bitmap_color color, double opacity)
 {
     int x1 = x + width < (int)im->width ? x + width : (int)im->width;
     int y1 = y + height < (int)im->height ? y + height : (int)im->height;
     for (int v = y > 0 ? y : 0; v < y1; ++v) {
         for (int u = x > 0 ? x : 0; u < x1; ++u) {
-            image_blend(im, u, v, color, opacity);
+            bitmap_blend(im, u, v, color, opacity);
         }
     }
 }
 
-void image_frame(image *im, int x, int y, int width, int height, int thickness, image_color color)
+void bitmap_frame(bitmap *im, int x, int y, int width, int height, int thickness, bitmap_color color)
 {
-    image_rectangle(im, x, y, width, thickness, color, 1.0);
-    image_rectangle(im, x, y + height - thickness, width, thickness, color, 1.0);
-    image_rectangle(im, x, y + thickness, thickness, height - 2 * thickness, color, 1.0);
-    image_rectangle(im, x + width - thickness, y + thickness, thickness, height - 2 * thickness, color,
+    bitmap_rectangle(im, x, y, width, thickness, color, 1.0);
+    bitmap_rectangle(im, x, y + height - thickness, width, thickness, color, 1.0);
+    bitmap_rectangle(im, x, y + thickness, thickness, height - 2 * thickness, color, 1.0);
+    bitmap_rectangle(im, x + width - thickness, y + thickness, thickness, height - 2 * thickness, color,
                     1.0);
 }
 
@@ -101,7 +101,7 @@ static void pixel_range(double low, double high, uint32_t size, int *first, int 
 }
 
 /* Cut a segment to the picture and a margin around it (Liang and Barsky); false: nothing is left. */
-static bool clip_segment(const image *im, double margin, double p[4])
+static bool clip_segment(const bitmap *im, double margin, double p[4])
 {
     const double size[2] = {im->width, im->height};
     double from = 0.0, to = 1.0;
@@ -124,7 +124,7 @@ static bool clip_segment(const image *im, double margin, double p[4])
     return from <= to;
 }
 
-void image_line(image *im, double x0, double y0, double x1, double y1, double width, image_color color,
+void bitmap_line(bitmap *im, double x0, double y0, double x1, double y1, double width, bitmap_color color,
                 double opacity)
 {
     double p[4] = {x0, y0, x1, y1}, radius = width / 2;
@@ -150,14 +150,14 @@ void image_line(image *im, double x0, double y0, double x1, double y1, double wi
             double t = square > 0.0 ? (ux * dx + uy * dy) / square : 0.0;
             t = t < 0.0 ? 0.0 : t > 1.0 ? 1.0 : t;
             double distance = hypot(ux - t * dx, uy - t * dy);
-            image_blend(im, x, y, color, opacity * fmin(1.0, radius + 0.5 - distance));
+            bitmap_blend(im, x, y, color, opacity * fmin(1.0, radius + 0.5 - distance));
         }
     }
 }
 
-void image_disc(image *im, double x, double y, double radius, image_color color, double opacity)
+void bitmap_disc(bitmap *im, double x, double y, double radius, bitmap_color color, double opacity)
 {
-    image_line(im, x, y, x, y, 2 * radius, color, opacity);
+    bitmap_line(im, x, y, x, y, 2 * radius, color, opacity);
 }
 
 /* How much of the pixel row's span [x, x+1] lies between low and high. */
@@ -183,7 +183,7 @@ static bool cut_row(const double (*c)[2], uint32_t count, double y, double *low,
     return *low < *high;
 }
 
-void image_polygon(image *im, const double (*corners)[2], uint32_t count, image_color color,
+void bitmap_polygon(bitmap *im, const double (*corners)[2], uint32_t count, bitmap_color color,
                    double opacity)
 {
     enum { ROWS = 4 }; /* samples of a pixel row; across, the cover is exact */
@@ -211,23 +211,23 @@ void image_polygon(image *im, const double (*corners)[2], uint32_t count, image_
             for (uint32_t s = 0; s < cuts; ++s) {
                 cover += overlap(x, low[s], high[s]) / ROWS;
             }
-            image_blend(im, x, y, color, opacity * cover);
+            bitmap_blend(im, x, y, color, opacity * cover);
         }
     }
 }
 
-void image_stretch(image *im, const image *from)
+void bitmap_stretch(bitmap *im, const bitmap *from)
 {
     for (uint32_t y = 0; y < im->height; ++y) {
         for (uint32_t x = 0; x < im->width; ++x) {
-            image_set(im, (int)x, (int)y,
-                      image_get(from, (int)((uint64_t)x * from->width / im->width),
+            bitmap_set(im, (int)x, (int)y,
+                      bitmap_get(from, (int)((uint64_t)x * from->width / im->width),
                                 (int)((uint64_t)y * from->height / im->height)));
         }
     }
 }
 
-void image_shrink(image *im, const image *from, uint32_t factor)
+void bitmap_shrink(bitmap *im, const bitmap *from, uint32_t factor)
 {
     uint32_t area = factor * factor;
     for (uint32_t y = 0; y < im->height; ++y) {
