@@ -14,7 +14,7 @@ bool model_fail_memory(umb_error *error, const char *scene);
  * uses, then meshes and links to meshes without triangles. */
 bool model_clean(model *m);
 
-/* Rebasing. Axes on which the box lies far from the origin (its centre farther than twice the
+/* Rebasing. Axes on which the box lies far from the origin (its centre farther than eight times the
  * scene's extent) get an origin near the centre, the others 0. The offset is a multiple of the float
  * step at the box's far end and of a power of two near an eighth of the extent, so every float
  * coordinate in the box minus the offset is a float again (both lie within a factor of two). */

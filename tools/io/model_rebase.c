@@ -28,7 +28,7 @@ void model_choose_origin(const double min[3], const double max[3], double origin
     for (int i = 0; i < 3; ++i) {
         double centre = 0.5 * (min[i] + max[i]);
         origin[i] = 0.0;
-        if (!(extent > 0.0) || !(fabs(centre) > 2.0 * extent)) {
+        if (!(extent > 0.0) || !(fabs(centre) > 8.0 * extent)) {
             continue;
         }
         int exponent;

@@ -62,11 +62,14 @@ static void link_ring(point *points, uint32_t first, uint32_t end, bool backward
     }
 }
 
-/* True if the open segments a-b and c-d cross. */
-static bool cross(const point *a, const point *b, const point *c, const point *d)
+/* True if the open segments a-b and c-d cross, or c lies on a-b and is neither of its ends. */
+static bool blocks(const point *a, const point *b, const point *c, const point *d)
 {
     double c_side = turn(a, b, c);
     double d_side = turn(a, b, d);
+    if (c_side == 0.0 && (a->x - c->x) * (b->x - c->x) + (a->y - c->y) * (b->y - c->y) < 0.0) {
+        return true;
+    }
     double a_side = turn(c, d, a);
     double b_side = turn(c, d, b);
     return ((c_side > 0.0 && d_side < 0.0) || (c_side < 0.0 && d_side > 0.0)) &&
@@ -84,11 +87,11 @@ static bool in_cone(const point *points, const point *q, const point *m)
     return turn(q, after, m) > 0.0 || turn(before, q, m) > 0.0;
 }
 
-static bool crosses_list(const outline *o, uint32_t start, const point *a, const point *b)
+static bool list_blocks(const outline *o, uint32_t start, const point *a, const point *b)
 {
     uint32_t i = start;
     do {
-        if (cross(a, b, &o->points[i], &o->points[o->points[i].next])) {
+        if (blocks(a, b, &o->points[i], &o->points[o->points[i].next])) {
             return true;
         }
         i = o->points[i].next;
@@ -107,8 +110,8 @@ static uint32_t find_bridge(const outline *o, uint32_t m)
     do {
         const point *to = &o->points[i];
         double distance = (to->x - from->x) * (to->x - from->x) + (to->y - from->y) * (to->y - from->y);
-        if (distance < best_distance && in_cone(o->points, to, from) && !crosses_list(o, o->start, from, to) &&
-            !crosses_list(o, m, from, to)) {
+        if (distance < best_distance && in_cone(o->points, to, from) && in_cone(o->points, from, to) &&
+            !list_blocks(o, o->start, from, to) && !list_blocks(o, m, from, to)) {
             best = i;
             best_distance = distance;
         }

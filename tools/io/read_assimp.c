@@ -14,6 +14,7 @@
 
 #include "import_files.h"
 #include "model_parts.h"
+#include "read_apart.h"
 #include "readers.h"
 
 /* A node's transform to the world, accumulated in double. */
@@ -171,7 +172,8 @@ static bool read_scene(assimp_reader *r)
     return read;
 }
 
-model *read_assimp(const char *path, const model_options *options, umb_error *error)
+/* A model not finished yet: runs in a child. */
+static model *import(const char *path, umb_error *error)
 {
     double origin[3] = {0};
     import_files files;
@@ -183,15 +185,18 @@ model *read_assimp(const char *path, const model_options *options, umb_error *er
     r.cards = input_ends_with(path, ".ac") || input_ends_with(path, ".acc");
     bool read = false;
     if (r.scene == NULL) {
-        model_fail(error, UMB_ERROR_FORMAT, "%s: the importer says: %.150s; convert the scene to glTF", path,
-                   aiGetErrorString());
+        const char *said = aiGetErrorString();
+        size_t length = strcspn(said, "\n");
+        length -= length != 0 && said[length - 1] == '.';
+        model_fail(error, UMB_ERROR_FORMAT, "%s: the importer says: %.*s; convert the scene to glTF", path,
+                   length < 120 ? (int)length : 120, said);
     } else if (r.into == NULL || !read_scene(&r)) {
         model_fail_memory(error, path);
     } else if (r.into->object_count == 0) {
         model_fail(error, UMB_ERROR_FORMAT, "%s: no meshes in it; name a scene with surfaces", path);
     } else {
         memcpy(r.into->origin, origin, sizeof origin);
-        read = model_finish(r.into, options, error);
+        read = true;
     }
     if (r.scene != NULL) {
         aiReleaseImport(r.scene);
@@ -201,4 +206,14 @@ model *read_assimp(const char *path, const model_options *options, umb_error *er
         return NULL;
     }
     return r.into;
+}
+
+model *read_assimp(const char *path, const model_options *options, umb_error *error)
+{
+    model *m = read_apart(import, path, error);
+    if (m != NULL && !model_finish(m, options, error)) {
+        model_free(m);
+        return NULL;
+    }
+    return m;
 }
