@@ -11,7 +11,8 @@
 /* One tile of the occluder being drawn. */
 typedef struct window_tile {
     uint32_t mask[UMB_TILE_HEIGHT];
-    float z[8];
+    float z[8];    /* least of all triangles that touch the sub-tile */
+    float held[8]; /* greatest of those that hold all of it; -infinity: none */
 } window_tile;
 
 typedef struct raster {
@@ -186,6 +187,7 @@ static bool want_tiles(raster *r, const window *w)
             }
             for (uint32_t s = 0; s < 8; ++s) {
                 tile->z[s] = INFINITY;
+                tile->held[s] = -INFINITY;
             }
         }
     }
@@ -202,13 +204,45 @@ static float farthest_in(const umb_depth_triangle *t, double x, double y)
     return (float)(z - 0x1p-21 * fabs(z));
 }
 
+typedef enum overlap {
+    BESIDE,
+    TOUCHES,
+    HOLDS
+} overlap;
+
+/* How a triangle's image lies to the closed sub-tile at (x, y). */
+static overlap place_sub_tile(const umb_depth_triangle *t, double x, double y)
+{
+    if (t->x_max < x || t->x_min > x + 8.0 || t->y_max < y || t->y_min > y + 4.0) {
+        return BESIDE;
+    }
+    bool holds = t->side_count > 0;
+    for (uint32_t i = 0; i < t->side_count; ++i) {
+        double at = t->ex[i] * x + t->ey[i] * y + t->e0[i];
+        double wide = t->ex[i] * 8.0, high = t->ey[i] * 4.0;
+        double most = at + (wide > 0.0 ? wide : 0.0) + (high > 0.0 ? high : 0.0);
+        double least = at + (wide < 0.0 ? wide : 0.0) + (high < 0.0 ? high : 0.0);
+        if (most < -t->margin[i]) {
+            return BESIDE;
+        }
+        holds = holds && least > t->margin[i];
+    }
+    return holds ? HOLDS : TOUCHES;
+}
+
+/* All that touch a sub-tile bound its depth together, from the farthest; one that holds all of it does so
+ * alone, however far the others are. */
 static void lower_tile(window_tile *tile, const umb_depth_triangle *t, uint32_t tx, uint32_t ty)
 {
     for (uint32_t s = 0; s < 8; ++s) {
         double x = tx * UMB_TILE_WIDTH + 8.0 * (s % 4), y = ty * UMB_TILE_HEIGHT + 4.0 * (s / 4);
-        bool beside = t->x_max < x || t->x_min > x + 8.0 || t->y_max < y || t->y_min > y + 4.0;
+        overlap place = place_sub_tile(t, x, y);
+        if (place == BESIDE) {
+            continue;
+        }
         float z = farthest_in(t, x, y);
-        tile->z[s] = beside || z >= tile->z[s] ? tile->z[s] : z;
+        tile->z[s] = z < tile->z[s] ? z : tile->z[s];
+        tile->held[s] = place == HOLDS && z > tile->held[s] ? z : tile->held[s];
     }
 }
 
@@ -236,8 +270,12 @@ static void merge_tiles(raster *r, const window *w)
         for (uint32_t tx = w->tx0; tx <= w->tx1; ++tx) {
             uint32_t t = ty * r->coverage.columns + tx;
             if (r->wanted[t] != 0) {
-                umb_coverage_merge(&r->coverage, t, r->window[t].mask, r->window[t].z);
-                memset(r->window[t].mask, 0, sizeof r->window[t].mask);
+                window_tile *tile = &r->window[t];
+                for (uint32_t s = 0; s < 8; ++s) {
+                    tile->z[s] = tile->held[s] > tile->z[s] ? tile->held[s] : tile->z[s];
+                }
+                umb_coverage_merge(&r->coverage, t, tile->mask, tile->z);
+                memset(tile->mask, 0, sizeof tile->mask);
             }
         }
     }

@@ -221,6 +221,26 @@ static float float_up(double v)
     return -float_down(-v);
 }
 
+/* The three sides of an image, turned inwards. With ends off by an error each and rounding of a few units,
+ * the value at a raster point is off by at most the error times twice the lengths involved, doubled. */
+static void find_sides(umb_depth_triangle *t, const umb_raster_map *map, const umb_raster_point *const p[3])
+{
+    double area = (p[1]->x - p[0]->x) * (p[2]->y - p[0]->y) - (p[1]->y - p[0]->y) * (p[2]->x - p[0]->x);
+    double turn = area < 0.0 ? -1.0 : 1.0;
+    double raster = (double)map->width + map->height;
+    t->side_count = 3;
+    for (int i = 0; i < 3; ++i) {
+        const umb_raster_point *a = p[i], *b = p[(i + 1) % 3];
+        double dx = turn * (b->x - a->x), dy = turn * (b->y - a->y);
+        double reach = raster + fabs(a->x) + fabs(a->y), length = fabs(dx) + fabs(dy);
+        double error = a->error > b->error ? a->error : b->error;
+        t->ex[i] = -dy;
+        t->ey[i] = dx;
+        t->e0[i] = dy * a->x - dx * a->y;
+        t->margin[i] = 4.0 * error * (reach + length) + 16.0 * UMB_U * length * reach;
+    }
+}
+
 static void add_triangle(umb_silhouette *s, const umb_raster_map *map, const face *f,
                          const uint32_t corner[3], const box *image)
 {
@@ -241,6 +261,12 @@ static void add_triangle(umb_silhouette *s, const umb_raster_map *map, const fac
     if (!plane_nearness(t, map, f, s->world[corner[0]])) {
         t->gx = t->gy = 0.0;
         t->g0 = t->least;
+    }
+    t->side_count = 0;
+    if (kept(s, corner[0]) && kept(s, corner[1]) && kept(s, corner[2])) {
+        const umb_raster_point *const p[3] = {&s->points[corner[0]], &s->points[corner[1]],
+                                              &s->points[corner[2]]};
+        find_sides(t, map, p);
     }
     t->x_min = float_down(image->x_min);
     t->y_min = float_down(image->y_min);

@@ -23,6 +23,10 @@ typedef struct umb_outline_edge {
  * triangle (cut at the near depth) projects, but for a relative
  * 2^-22 that the user of the plane takes off. */
 typedef struct umb_depth_triangle {
+    /* Sides: ex x + ey y + e0 is below -margin only where the image of the triangle is not, for each side;
+       above margin for all three only where it is. side_count 0: no use can be made of them. */
+    double ex[3], ey[3], e0[3], margin[3];
+    uint32_t side_count;
     double gx, gy, g0;
     double least;                   /* nearness of its farthest vertex, rounded away from the eye */
     float x_min, y_min, x_max, y_max; /* box of its image in pixels, outer */
