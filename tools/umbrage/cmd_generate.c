@@ -15,10 +15,13 @@ static int write_model(const model *m, const options *o)
     if (!place) {
         return fail(o, EXIT_INPUT, "%s: not enough memory", o->output);
     }
-    bool good = write_glb(m, place, &error);
-    if (!good) {
+    if (!write_glb(m, place, &error)) {
+        /* The message begins with the name that was written to, which is not the user's. */
+        size_t length = strlen(place);
+        bool named = strncmp(error.text, place, length) == 0;
+        int code = fail(o, EXIT_INPUT, "%s%s", named ? o->output : "", error.text + (named ? length : 0));
         part_file_end(false);
-        return fail(o, EXIT_INPUT, "%s", error.text);
+        return code;
     }
     return part_file_end(true)
                ? EXIT_DONE

@@ -1,5 +1,6 @@
 #include "frame.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -63,7 +64,7 @@ int frame_answer(const setup *s, const options *o, const umb_view *view, bool wi
     memset(out, 0, sizeof *out);
     double start = progress_clock();
     umb_result result = umb_cull(s->culler, view, &seen);
-    out->time_ms = progress_clock() - start;
+    out->time_ms = nearbyint((progress_clock() - start) * 1e6) / 1e6; /* the clock's nanoseconds */
     if (result != UMB_OK) {
         return answer_failure(s, o, result);
     }

@@ -15,6 +15,8 @@ static const command commands[COMMAND_COUNT] = {
                        "Compare visible sets with exact visibility, proven by rays", cmd_check},
     [COMMAND_EXPLAIN] = {"explain", "SCENE", "--eye X,Y,Z --target X,Y,Z --object ID [options]",
                          "Why an object is visible or hidden", cmd_explain},
+    [COMMAND_RENDER] = {"render", "SCENE", "--eye X,Y,Z --target X,Y,Z -o FILE.png [options]",
+                        "Pictures of a view", cmd_render},
     [COMMAND_GENERATE] = {"generate", "gen:NAME,key=value", "-o FILE.glb",
                           "Write a generated scene to a file", cmd_generate},
 };

@@ -10,7 +10,7 @@
 
 enum {
     ALL = (1u << COMMAND_COUNT) - 1,
-    ONE_VIEW = BIT(CULL) | BIT(EXPLAIN),
+    ONE_VIEW = BIT(CULL) | BIT(EXPLAIN) | BIT(RENDER),
     MANY_VIEWS = BIT(WALK) | BIT(CHECK),
     VIEWS = ONE_VIEW | MANY_VIEWS,
     SCENES = BIT(INFO) | VIEWS
@@ -22,13 +22,13 @@ enum {
 static bool read_number(const char *text, const char **end, double *out)
 {
     char *stop;
-    /* strtod also takes blanks, hexadecimal digits and words. */
-    if (strspn(text, "+-.0123456789eE") == 0) {
+    size_t span = strspn(text, "+-.0123456789eE"); /* strtod also takes blanks, hexadecimal digits, words */
+    if (span == 0) {
         return false;
     }
     *out = strtod(text, &stop);
     *end = stop;
-    return stop != text && isfinite(*out);
+    return stop != text && (size_t)(stop - text) <= span && isfinite(*out);
 }
 
 static const char *number(const char *text, double *out)
@@ -272,6 +272,25 @@ static const char *read_output(options *o, const char *text)
     return *text ? NULL : "a file name";
 }
 
+static const char *read_what(options *o, const char *text)
+{
+    static const struct {
+        const char *name;
+        uint32_t pictures;
+    } kinds[] = {{"eye", PICTURE_EYE},
+                 {"ids", PICTURE_IDS},
+                 {"occlusion", PICTURE_OCCLUSION},
+                 {"map", PICTURE_MAP},
+                 {"all", PICTURE_ALL}};
+    for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; ++i) {
+        if (strcmp(text, kinds[i].name) == 0) {
+            o->pictures = kinds[i].pictures;
+            return NULL;
+        }
+    }
+    return "one of eye, ids, occlusion, map, all";
+}
+
 /* Only that it was given matters. */
 static const char *read_flag(options *o, const char *text)
 {
@@ -324,7 +343,8 @@ static const option_spec specs[] = {
     {"grid", 0, BIT(CHECK) | BIT(EXPLAIN), "WxH", read_grid, "first rays of the oracle (default: --size)"},
     {"rays", 0, BIT(CHECK) | BIT(EXPLAIN), "N", read_rays, "most guided rays a view (default 4M)"},
     {"object", 0, BIT(EXPLAIN), "ID", read_object, "the object to explain"},
-    {"output", 'o', BIT(GENERATE), "FILE", read_output, "the file to write"},
+    {"what", 0, BIT(RENDER), "KIND", read_what, "eye, ids, occlusion, map or all (default eye)"},
+    {"output", 'o', BIT(RENDER) | BIT(GENERATE), "FILE", read_output, "the file to write"},
 
     {"json", 0, ALL, NULL, read_flag, "one JSON object on one line instead of text"},
     {"progress", 0, ALL, NULL, read_flag, "show progress though standard error is no terminal"},

@@ -31,7 +31,7 @@ typedef struct options {
 
     model_options model;
     const char *seed; /* digits, or NULL */
-    const char *path, *output, *capture;
+    const char *path, *output;
 
     double eye[3], target[3], up[3];
     double fov, ortho_height, near_depth, far_depth, min_pixels;
@@ -64,6 +64,7 @@ enum {
     COMMAND_WALK,
     COMMAND_CHECK,
     COMMAND_EXPLAIN,
+    COMMAND_RENDER,
     COMMAND_GENERATE,
     COMMAND_COUNT
 };
@@ -73,6 +74,7 @@ int cmd_cull(const options *o);
 int cmd_walk(const options *o);
 int cmd_check(const options *o);
 int cmd_explain(const options *o);
+int cmd_render(const options *o);
 int cmd_generate(const options *o);
 
 /* Read the words after the subcommand. EXIT_DONE, or EXIT_USAGE with the message printed. *help is set

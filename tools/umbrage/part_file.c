@@ -13,12 +13,16 @@ static char *volatile part; /* what an interrupt removes */
 static char *name;          /* what is being written */
 static char *whole;         /* what it is to become; NULL: it has its name already */
 static volatile sig_atomic_t held, pending; /* an interrupt waits; one is waiting */
+static pid_t owner; /* readers may fork; a child leaves without a word */
 
 static void interrupted(int number)
 {
     static const char text[] = "umbrage: interrupted; nothing was left half-written\n";
     char *unfinished = part;
     (void)number;
+    if (getpid() != owner) {
+        _exit(EXIT_INTERRUPTED);
+    }
     if (held) {
         pending = 1;
         return;
@@ -34,6 +38,7 @@ static void interrupted(int number)
 void part_file_watch(void)
 {
     struct sigaction action;
+    owner = getpid();
     memset(&action, 0, sizeof action);
     action.sa_handler = interrupted;
     action.sa_flags = SA_RESTART;

@@ -56,7 +56,7 @@ int setup_model(setup *s, const options *o)
     if (!s->model) {
         return load_failure(o, o->input, &s->error);
     }
-    s->load_ms = progress_clock() - start;
+    s->load_ms = nearbyint((progress_clock() - start) * 1e3) / 1e3;
     return EXIT_DONE;
 }
 
@@ -83,7 +83,7 @@ int setup_scene(setup *s, const options *o)
     if (result != UMB_OK) {
         return fail(o, EXIT_INPUT, "%s: the index: %s", o->input, umb_result_name(result));
     }
-    s->build_ms = progress_clock() - start;
+    s->build_ms = nearbyint((progress_clock() - start) * 1e3) / 1e3;
     return EXIT_DONE;
 }
 
