@@ -119,7 +119,7 @@ static void draw_ramp_legend(bitmap *im, double near_depth, double far_depth)
     snprintf(high_text, sizeof high_text, "%.3g", far_depth);
     int low_width = bitmap_text_width(low, s), text_width = bitmap_text_width(high_text, s);
     int x = pad, y = (int)im->height - high - 3 * pad;
-    bitmap_rectangle(im, x, y, low_width + text_width + length + 6 * pad / 2 + pad, high + 2 * pad, night, 0.75);
+    bitmap_rectangle(im, x, y, low_width + text_width + length + 3 * pad, high + 2 * pad, night, 0.75);
     x += pad;
     y += pad;
     bitmap_text(im, x, y, s, low, 0xFFFFFF);

@@ -32,8 +32,9 @@ bool picture_ids(bitmap *im, truth *t, const umb_view *view, const uint8_t *stat
 bool picture_occlusion(bitmap *im, const model *m, const umb_culler *culler, const umb_view *view,
                        const uint32_t *boxes, uint32_t box_count);
 
-/* The map, seen along the model's up axis, coloured by state. Only surfaces that face up are drawn, so rooms
- * are seen through their ceilings; where something is above the eye, what lies above it is cut away. */
+/* The map, seen along the model's up axis (m->up: set it first where the user names another), coloured by
+ * state. Only surfaces that face up are drawn, so rooms are seen through their ceilings; where something is
+ * above the eye, what lies above it is cut away. A visible storey shows through hidden ones above it. */
 bool picture_map(bitmap *im, const model *m, const umb_view *view, const uint8_t *states);
 
 #endif

@@ -59,8 +59,8 @@ static int compare_floats(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* The span that holds all but the outermost hundredth of the objects' boxes at either end: one stray
- * object must not shrink the map to a dot. */
+/* The span that holds all but the outermost hundredth of the objects' boxes at either end, or, where the
+ * outer tenths lie far out, little more than the rest: a few stray objects must not shrink the map to a dot. */
 static bool span_of(const model *m, int axis, double sign, double *low, double *high)
 {
     float *ends = malloc(2 * sizeof *ends * ((size_t)m->object_count + 1));
@@ -80,6 +80,14 @@ static bool span_of(const model *m, int axis, double sign, double *low, double *
     qsort(maxes, count, sizeof *maxes, compare_floats);
     *low = count ? mins[count / 100] : -1;
     *high = count ? maxes[count - 1 - count / 100] : 1;
+    if (count) {
+        double inner_low = mins[count / 10], inner_high = maxes[count - 1 - count / 10];
+        double inner = inner_high - inner_low;
+        if (inner > 0 && *high - *low > 3 * inner) {
+            *low = fmax(*low, inner_low - 0.4 * inner);
+            *high = fmin(*high, inner_high + 0.4 * inner);
+        }
+    }
     if (!(*high > *low)) {
         *low -= 1;
         *high = *low + 2;
