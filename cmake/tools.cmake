@@ -44,13 +44,19 @@ list(APPEND UMB_INSIDE umbrage_inside)
 
 include(cmake/tests.cmake)
 
+# bench/yardstick_ISA.c has its instruction set's flags, as the core's kernels have; bench/bench_NAME.c
+# is one program.
 if(UMB_BENCH)
-  file(GLOB UMB_BENCH_SOURCES CONFIGURE_DEPENDS bench/*.c)
+  add_library(umb_yardstick STATIC bench/yardstick.c bench/yardstick_avx2.c)
+  if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64)$")
+    set_source_files_properties(bench/yardstick_avx2.c PROPERTIES COMPILE_OPTIONS "-O3;-mavx2")
+  endif()
+  file(GLOB UMB_BENCH_SOURCES CONFIGURE_DEPENDS bench/bench_*.c)
   foreach(source ${UMB_BENCH_SOURCES})
     get_filename_component(name ${source} NAME_WE)
     add_executable(${name} ${source})
     target_include_directories(${name} PRIVATE src tools)
-    target_link_libraries(${name} PRIVATE ${UMB_INSIDE} PkgConfig::JANSSON m)
+    target_link_libraries(${name} PRIVATE umb_yardstick ${UMB_INSIDE} PkgConfig::JANSSON m)
     set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bench)
   endforeach()
 endif()

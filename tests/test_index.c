@@ -419,6 +419,41 @@ static void test_failing_allocations(void **state)
     assert_true(m.bytes == 0);
 }
 
+/* A commit that finds no memory leaves the index behind, and says so; the next one catches up. */
+static void test_failing_commit(void **state)
+{
+    (void)state;
+    uint64_t seed = 41;
+    meter m = {umb_memory_allocator(NULL), -1, 0};
+    umb_scene_def scene_def = {.allocator = {metered, &m}};
+    umb_scene *scene;
+    umb_index *index;
+    uint32_t behind = 0;
+    assert_int_equal(umb_scene_create(&scene_def, &scene), UMB_OK);
+    assert_int_equal(umb_index_create(scene, NULL, &index), UMB_OK);
+    check_index(index);
+    for (int64_t limit = 0; limit < 60; ++limit) {
+        for (uint32_t i = 0; i < 100; ++i) {
+            umb_object_def def = {.bounds = box_of_set(&seed, SPREAD, i)};
+            uint32_t id;
+            assert_int_equal(umb_scene_add_object(scene, &def, &id), UMB_OK);
+        }
+        m.left = limit;
+        umb_result result = umb_scene_commit(scene);
+        m.left = -1;
+        bool stale = umb_index_tree(index)->version != umb_scene_committed(scene)->version;
+        assert_true(result == UMB_OK || result == UMB_ERROR_MEMORY);
+        assert_true(!stale || result == UMB_ERROR_MEMORY);
+        behind += stale;
+        assert_int_equal(umb_scene_commit(scene), UMB_OK);
+        check_index(index);
+    }
+    assert_true(behind > 0);
+    umb_index_destroy(index);
+    umb_scene_destroy(scene);
+    assert_true(m.bytes == 0);
+}
+
 static void test_bad_kind(void **state)
 {
     (void)state;
@@ -491,10 +526,11 @@ static void test_queries(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_all_sets), cmocka_unit_test(test_flat_order),
-        cmocka_unit_test(test_commits),  cmocka_unit_test(test_same_for_any_workers),
-        cmocka_unit_test(test_quality),  cmocka_unit_test(test_failing_allocations),
-        cmocka_unit_test(test_bad_kind), cmocka_unit_test(test_queries),
+        cmocka_unit_test(test_all_sets),       cmocka_unit_test(test_flat_order),
+        cmocka_unit_test(test_commits),        cmocka_unit_test(test_same_for_any_workers),
+        cmocka_unit_test(test_quality),        cmocka_unit_test(test_failing_allocations),
+        cmocka_unit_test(test_failing_commit), cmocka_unit_test(test_bad_kind),
+        cmocka_unit_test(test_queries),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
