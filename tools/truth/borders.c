@@ -11,9 +11,13 @@
 
 #include "search.h"
 
-#define MAX_SAMPLES 96
-#define SAMPLE_PIXELS 3.0
+#define MAX_SAMPLES 256
+#define SAMPLE_PIXELS 1.0
 #define HALVINGS 5
+
+/* How far beside an edge, in grid cells. 0: along the edge itself, where cracks between triangles that
+ * only nearly meet (T-junctions) let rays through; shared edges do not. */
+static const double beside[] = {0.0, 1e-3, 0.3};
 
 typedef struct half_edge {
     uint32_t low, high; /* corners, welded by position */
@@ -299,7 +303,10 @@ void border_item(worker *w, uint64_t item)
             continue;
         }
         plan_samples(s, &b);
-        walk(w, &b, oracle_mix(number, (uint64_t)i, 1), 1e-3);
-        walk(w, &b, oracle_mix(number, (uint64_t)i, 2), 0.3);
+        for (uint32_t k = 0; k < sizeof(beside) / sizeof(beside[0]); ++k) {
+            w->along_edge = beside[k] == 0.0;
+            walk(w, &b, oracle_mix(number, (uint64_t)i, k), beside[k]);
+            w->along_edge = false;
+        }
     }
 }

@@ -201,41 +201,14 @@ static bool blocks(confirmation *c, uint32_t object, uint32_t triangle)
            exact_compare(&at, &c->target, &c->lost) < 0;
 }
 
-/* Does the segment meet the box? Grown by 1e-9 of the largest coordinate: a million times what the
- * rounding of these few operations can be, so a box that is touched is never passed over. */
-static bool segment_meets_box(const double from[3], const double to[3], const umb_aabb *box)
+static bool passes_object(void *user, uint32_t object)
 {
-    double low = 0.0, high = 1.0;
-    for (int i = 0; i < 3; ++i) {
-        double d = to[i] - from[i];
-        double size = fmax(fmax(fabs(from[i]), fabs(to[i])),
-                           fmax(fabs((double)box->min[i]), fabs((double)box->max[i])));
-        double a = box->min[i] - from[i] - 1e-9 * size, b = box->max[i] - from[i] + 1e-9 * size;
-        if (fabs(d) <= 1e-9 * size) {
-            if (a > fabs(d) || b < -fabs(d)) {
-                return false;
-            }
-            continue;
-        }
-        double s0 = a / d, s1 = b / d;
-        low = fmax(low, fmin(s0, s1));
-        high = fmin(high, fmax(s0, s1));
-    }
-    return low <= high + 1e-9;
-}
-
-static bool path_is_free(confirmation *c, const double to[3])
-{
+    confirmation *c = user;
     const model *m = c->t->model;
-    for (uint32_t i = 0; i < m->object_count; ++i) {
-        const model_object *o = &m->objects[i];
-        if (o->mesh == MODEL_NONE || !segment_meets_box(c->sight.from, to, &o->bounds)) {
-            continue;
-        }
-        for (uint32_t k = 0; k < m->meshes[o->mesh].triangle_count; ++k) {
-            if (blocks(c, i, k) || c->lost) {
-                return false;
-            }
+    uint32_t count = m->meshes[m->objects[object].mesh].triangle_count;
+    for (uint32_t k = 0; k < count; ++k) {
+        if (blocks(c, object, k) || c->lost) {
+            return false;
         }
     }
     return true;
@@ -264,7 +237,7 @@ bool oracle_confirm(const truth *t, const oracle_view *v, const double through[3
         w.from[i] = c.sight.from[i];
         w.to[i] = c.line.origin[i] + s * c.line.approximate[i];
     }
-    if (!path_is_free(&c, w.to) || c.lost) {
+    if (!oracle_boxes_walk(t, w.from, w.to, passes_object, &c) || c.lost) {
         return false;
     }
     *out = w;

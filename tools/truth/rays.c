@@ -8,10 +8,12 @@
 #include "search.h"
 
 #define DEFAULT_BUDGET 4000000u
-#define MIN_ROUNDS 3u
+#define QUIET_ROUNDS 2u /* rounds without news that end the search */
 #define MAX_ROUNDS 64u
 #define EXTREMES 9
 #define SCANNED_TRIANGLES 4096u
+#define ROUND_SHARE 300000u /* about as many rays aimed in a round, shared by the objects not seen */
+#define MAX_VISITS 48u
 
 static uint32_t cast_picture(worker *w, double x, double y)
 {
@@ -25,6 +27,16 @@ static void grid_item(worker *w, uint64_t row)
     search *s = w->s;
     for (uint32_t x = 0; x < s->grid_width; ++x) {
         s->grid[row * s->grid_width + x] = cast_picture(w, x + 0.5, (double)row + 0.5);
+    }
+}
+
+/* The grid again, each ray anywhere in its cell. */
+static void jitter_item(worker *w, uint64_t row)
+{
+    search *s = w->s;
+    for (uint32_t x = 0; x < s->grid_width; ++x) {
+        uint64_t random = oracle_mix(s->round, row, x);
+        cast_picture(w, x + oracle_unit(random), (double)row + oracle_unit(oracle_mix(random, 0, 1)));
     }
 }
 
@@ -121,7 +133,11 @@ static void aim_at_extremes(worker *w, uint32_t object, uint8_t missing)
     for (int k = 0; k < EXTREMES; ++k) {
         float v[3][3];
         double p[3];
-        if (best[k].triangle == MODEL_NONE) {
+        bool again = best[k].triangle == MODEL_NONE;
+        for (int j = 0; j < k; ++j) {
+            again |= best[j].triangle == best[k].triangle && best[j].corner == best[k].corner;
+        }
+        if (again) {
             continue;
         }
         oracle_triangle(w->s->t, object, best[k].triangle, v);
@@ -143,7 +159,8 @@ static void aim_at_triangles(worker *w, uint32_t object, uint8_t missing)
 {
     search *s = w->s;
     uint32_t count = s->t->model->meshes[s->t->model->objects[object].mesh].triangle_count;
-    uint32_t visits = count < 12 ? count : 12;
+    uint32_t visits = ROUND_SHARE / (2 * (s->target_count + 1));
+    visits = visits < 4 ? 4 : visits > MAX_VISITS ? MAX_VISITS : visits;
     for (uint32_t k = 0; k < visits; ++k) {
         uint64_t random = oracle_mix(object, s->round, k);
         uint64_t turn = (s->round - 1) * visits + k;
@@ -223,8 +240,57 @@ static bool choose_borders(search *s, size_t *count)
     return true;
 }
 
+/* Items: target * 2 + renderer. Each writes its own object's proof only. */
+static void verify_item(worker *w, uint64_t item)
+{
+    search *s = w->s;
+    uint32_t object = s->targets[item / 2];
+    int r = (int)(item % 2);
+    const find *f = &s->finds[r][object];
+    if (f->ray != NO_RAY && !f->verified) {
+        oracle_confirm_near(s->t, &s->view, f->through, object, f->triangle, (uint8_t)(1u << r),
+                            &s->proven[r][object]);
+    }
+}
+
+static void settle(search *s, int r, uint32_t object)
+{
+    find *f = &s->finds[r][object];
+    if (f->ray == NO_RAY || f->verified) {
+        return;
+    }
+    if (s->proven[r][object].renderers) {
+        f->verified = true;
+        ++s->news;
+        return;
+    }
+    if (s->leaks[r][object].ray == NO_RAY) {
+        s->leaks[r][object] = *f;
+    }
+    ++f->refuted;
+    f->ray = NO_RAY;
+}
+
+/* Look into all finds that are not proven yet: prove them, or forget them. */
+static void verify(search *s)
+{
+    s->target_count = 0;
+    for (uint32_t i = 0; i < s->t->model->object_count; ++i) {
+        const find *a = &s->finds[0][i], *b = &s->finds[1][i];
+        if ((a->ray != NO_RAY && !a->verified) || (b->ray != NO_RAY && !b->verified)) {
+            s->targets[s->target_count++] = i;
+        }
+    }
+    search_phase(s, verify_item, 2 * (uint64_t)s->target_count, false);
+    for (uint32_t k = 0; k < s->target_count; ++k) {
+        settle(s, 0, s->targets[k]);
+        settle(s, 1, s->targets[k]);
+    }
+}
+
 static void rounds(search *s)
 {
+    uint32_t quiet = 0;
     for (s->round = 1; s->round <= MAX_ROUNDS && !s->failed && !s->spent; ++s->round) {
         size_t borders;
         s->news = 0;
@@ -233,38 +299,17 @@ static void rounds(search *s)
             return;
         }
         search_phase(s, border_item, borders, true);
+        verify(s);
         choose_targets(s);
         search_phase(s, target_item, s->target_count, true);
-        if (s->news == 0 && s->round >= MIN_ROUNDS) {
-            ++s->round;
-            break;
+        search_phase(s, jitter_item, s->grid_height, true);
+        verify(s);
+        quiet = s->news == 0 ? quiet + 1 : 0;
+        if (quiet == QUIET_ROUNDS) {
+            return;
         }
     }
     --s->round;
-}
-
-/* Items: object * 2 + renderer. */
-static void confirm_item(worker *w, uint64_t item)
-{
-    search *s = w->s;
-    uint32_t object = s->targets[item / 2];
-    int r = (int)(item % 2);
-    const find *f = &s->finds[r][object];
-    if (f->ray != NO_RAY) {
-        oracle_confirm_near(s->t, &s->view, f->through, object, f->triangle, (uint8_t)(1u << r),
-                            &s->confirmed[r][object]);
-    }
-}
-
-static void confirm_accused(search *s)
-{
-    s->target_count = 0;
-    for (uint32_t i = 0; s->options->accused && i < s->t->model->object_count; ++i) {
-        if (s->options->accused[i] && search_known(s, i)) {
-            s->targets[s->target_count++] = i;
-        }
-    }
-    search_phase(s, confirm_item, 2 * (uint64_t)s->target_count, false);
 }
 
 static bool search_make(search *s)
@@ -280,10 +325,11 @@ static bool search_make(search *s)
     bool ok = s->in_view && s->targets && s->known && s->grid && s->workers;
     for (int r = 0; r < 2; ++r) {
         s->finds[r] = calloc(objects + 1, sizeof(*s->finds[r]));
-        s->confirmed[r] = calloc(objects + 1, sizeof(*s->confirmed[r]));
-        ok = ok && s->finds[r] && s->confirmed[r];
+        s->proven[r] = calloc(objects + 1, sizeof(*s->proven[r]));
+        s->leaks[r] = calloc(objects + 1, sizeof(*s->leaks[r]));
+        ok = ok && s->finds[r] && s->proven[r] && s->leaks[r];
         for (size_t i = 0; ok && i < objects; ++i) {
-            s->finds[r][i].ray = NO_RAY;
+            s->finds[r][i].ray = s->leaks[r][i].ray = NO_RAY;
         }
     }
     for (uint32_t i = 0; ok && i < s->worker_count; ++i) {
@@ -309,7 +355,8 @@ static void search_free(search *s)
     }
     for (int r = 0; r < 2; ++r) {
         free(s->finds[r]);
-        free(s->confirmed[r]);
+        free(s->proven[r]);
+        free(s->leaks[r]);
     }
     free(s->workers);
     free(s->in_view);
@@ -320,21 +367,29 @@ static void search_free(search *s)
     free(s->grid);
 }
 
-static void fill_witnesses(const search *s, int r, truth_witness *out, uint32_t *count)
+/* Proven witnesses; for accused objects that have none for either renderer, the unproven ones. */
+static void fill_witnesses(const search *s, truth_result *out)
 {
+    truth_witness *lists[2] = {out->culling, out->two_sided};
+    uint32_t *counts[2] = {&out->visible_culling, &out->visible_two_sided};
+    const uint8_t *accused = s->options->accused;
     for (uint32_t i = 0; i < s->t->model->object_count; ++i) {
-        const find *f = &s->finds[r][i];
-        if (f->ray == NO_RAY) {
-            continue;
+        bool seen = search_known(s, i) != 0, leaked = false;
+        out->visible += seen;
+        for (int r = 0; r < 2; ++r) {
+            const find *leak = &s->leaks[r][i];
+            truth_witness *w = &lists[r][i];
+            if (s->finds[r][i].ray != NO_RAY) {
+                *w = s->proven[r][i];
+                ++*counts[r];
+            } else if (!seen && accused && accused[i] && leak->ray != NO_RAY) {
+                memcpy(w->from, leak->from, sizeof(w->from));
+                memcpy(w->to, leak->to, sizeof(w->to));
+                w->renderers = (uint8_t)(1u << r);
+                leaked = true;
+            }
         }
-        ++*count;
-        if (s->confirmed[r][i].renderers) {
-            out[i] = s->confirmed[r][i];
-            continue;
-        }
-        memcpy(out[i].from, f->from, sizeof(f->from));
-        memcpy(out[i].to, f->to, sizeof(f->to));
-        out[i].renderers = f->renderers;
+        out->unconfirmed += leaked;
     }
 }
 
@@ -346,11 +401,7 @@ static bool fill_result(const search *s, truth_result *out)
     if (!out->culling || !out->two_sided) {
         return false;
     }
-    fill_witnesses(s, 0, out->culling, &out->visible_culling);
-    fill_witnesses(s, 1, out->two_sided, &out->visible_two_sided);
-    for (uint32_t i = 0; i < objects; ++i) {
-        out->visible += search_known(s, i) != 0;
-    }
+    fill_witnesses(s, out);
     for (uint32_t i = 0; i < s->worker_count; ++i) {
         out->rays += s->workers[i].trace.rays;
     }
@@ -377,8 +428,8 @@ bool truth_view(truth *t, const umb_view *view, const truth_options *options, tr
     if (ok) {
         search_phase(&s, grid_item, s.grid_height, false);
         search_phase(&s, between_item, s.grid_height, true);
+        verify(&s);
         rounds(&s);
-        confirm_accused(&s);
         ok = !s.failed && fill_result(&s, out);
     }
     search_free(&s);

@@ -8,6 +8,9 @@
 #include <string.h>
 
 #define BLOCK_ITEMS 16384u
+/* Refuted finds of one object after which no more are looked into. */
+#define MAX_EDGE_LEAKS 4
+#define MAX_LEAKS 32
 
 static bool reserve(void **array, size_t *capacity, size_t need, size_t size)
 {
@@ -71,9 +74,16 @@ static void note(worker *w, const oracle_sight *sight, const oracle_hit *hit, ui
             return; /* beyond the far plane or outside an extra one: hides, but is not in view */
         }
     }
-    note_triangle(w, hit->object, hit->triangle);
-    uint8_t fresh = renderers & (uint8_t)~(search_known(w->s, hit->object) | w->reported[hit->object]);
-    if (fresh == 0) {
+    if (!w->along_edge) {
+        note_triangle(w, hit->object, hit->triangle);
+    }
+    uint8_t reported = w->reported[hit->object];
+    uint8_t fresh = renderers & (uint8_t)~(search_known(w->s, hit->object) | reported);
+    if (w->along_edge) {
+        fresh &= (uint8_t)~(reported >> 2);
+    }
+    if (fresh == 0 || w->s->finds[0][hit->object].refuted + w->s->finds[1][hit->object].refuted >=
+                          (w->along_edge ? MAX_EDGE_LEAKS : MAX_LEAKS)) {
         return;
     }
     if (!reserve((void **)&w->events, &w->event_capacity, w->event_count + 1, sizeof(*w->events))) {
@@ -81,9 +91,10 @@ static void note(worker *w, const oracle_sight *sight, const oracle_hit *hit, ui
         return;
     }
     find_event *e = &w->events[w->event_count++];
-    w->reported[hit->object] |= renderers;
+    w->reported[hit->object] |= w->along_edge ? (uint8_t)(renderers << 2) : renderers;
     e->object = hit->object;
-    e->what.ray = w->ray;
+    memset(&e->what, 0, sizeof(e->what));
+    e->what.ray = w->along_edge ? w->ray | RAY_ALONG_EDGE : w->ray;
     e->what.triangle = hit->triangle;
     e->what.renderers = renderers;
     memcpy(e->what.through, p, sizeof(p));
@@ -249,8 +260,9 @@ static void merge(search *s)
                 if ((e->what.renderers & 1u << r) == 0 || f->ray <= e->what.ray) {
                     continue;
                 }
-                s->news += f->ray == NO_RAY;
+                uint8_t refuted = f->refuted;
                 *f = e->what;
+                f->refuted = refuted;
             }
         }
         w->event_count = 0;

@@ -11,13 +11,18 @@
 #include "oracle.h"
 
 #define NO_RAY UINT64_MAX
+/* Set in the numbers of rays along edges: any other find of the block is preferred. */
+#define RAY_ALONG_EDGE ((uint64_t)1 << 63)
 
-/* What is known of one object for one renderer. */
+/* What is known of one object for one renderer. A find is a ray's word until it is verified; one that
+ * exact arithmetic refutes is forgotten, and remembered as a leak. */
 typedef struct find {
     uint64_t ray; /* NO_RAY: not seen */
     double through[3], from[3], to[3];
     uint32_t triangle;
     uint8_t renderers;
+    uint8_t refuted; /* how many finds of this object were leaks */
+    bool verified;
 } find;
 
 typedef struct find_event {
@@ -29,12 +34,15 @@ typedef struct worker {
     struct search *s;
     oracle_trace trace;
     uint64_t ray;            /* number of the ray being cast */
-    uint8_t *reported;       /* per object: renderers that this worker has an event for */
+    uint8_t *reported;       /* per object: renderers that this worker has an event for; two bits up,
+                                those by rays along edges */
     find_event *events;
     size_t event_count, event_capacity;
     uint64_t *triangles;     /* seen triangles, some more than once */
     size_t triangle_count, triangle_capacity;
     uint64_t recent[256];    /* triangles put there lately */
+    bool along_edge;         /* the rays being cast may slip through cracks of floats: what they see gets no
+                                borders walked */
     bool failed;
 } worker;
 
@@ -53,12 +61,13 @@ typedef struct search {
     uint32_t target_count;
     uint32_t *grid;          /* object seen through each grid cell, both sides shown */
     uint32_t grid_width, grid_height;
-    truth_witness *confirmed[2]; /* per object, for accused ones */
+    truth_witness *proven[2]; /* per object: verified finds */
+    find *leaks[2];          /* per object: the first refuted find, or NO_RAY */
     worker *workers;
     uint32_t worker_count;
     uint64_t phase, round;
     uint64_t guided, budget; /* rays of the guided phases so far */
-    uint64_t news;           /* finds of objects not seen before, of the running round */
+    uint64_t news;           /* verified finds of objects not seen before, of the running round */
     bool spent, failed;
 } search;
 

@@ -297,7 +297,7 @@ truth *truth_create(const model *m, umb_error *error)
     if (t) {
         t->model = m;
     }
-    if (t && prepare(t) && (t->flat ? build_flat(t) : build_instances(t))) {
+    if (t && prepare(t) && oracle_boxes_build(t) && (t->flat ? build_flat(t) : build_instances(t))) {
         return t;
     }
     if (error) {
@@ -340,6 +340,8 @@ void truth_destroy(truth *t)
     free(t->mesh_scenes);
     free(t->mesh_parts);
     free(t->neighbours);
+    free(t->order);
+    free(t->box_nodes);
     free(t->vertices);
     free(t->first_vertex);
     free(t->first_triangle);

@@ -1,7 +1,8 @@
 /* The oracle: which objects can be seen, proven by rays. Slow, and shares no code with any method.
  *
- * Definitions are those of docs/conservative.md. Every "visible" carries a witness: one free sight-line.
- * Rays prove visibility, never its absence.
+ * Definitions are those of docs/conservative.md. Every "visible" carries a witness: one free sight-line,
+ * checked in exact arithmetic (docs/oracle.md). Rays prove visibility, never its absence.
+ * Views and answers are in the model's coordinates (origin subtracted).
  */
 #ifndef TRUTH_H
 #define TRUTH_H
@@ -18,14 +19,16 @@ enum {
 
 typedef struct truth_witness {
     double from[3], to[3]; /* model coordinates (origin subtracted): a point of the near plane; a point of the object */
-    uint8_t renderers;     /* TRUTH_*: for which renderers this line is free; 0: no witness */
-    uint8_t confirmed;     /* 1: the line was checked in exact arithmetic against every triangle near it */
+    uint8_t renderers;     /* TRUTH_*: the renderer for which this line is free; 0: no witness */
+    uint8_t confirmed;     /* 1: the line was checked in exact arithmetic against every triangle near it.
+                              0 with a renderer: an accused object that only rays of floats see */
 } truth_witness;
 
 typedef struct truth_options {
     uint32_t grid_width, grid_height; /* rays of the dense grid; 0: the view's picture size */
     uint64_t guided_rays;  /* budget of rays aimed at objects not yet seen; 0: 4 million */
-    const uint8_t *accused; /* per object: 1 if a method hid it. Its witnesses are confirmed exactly. NULL: none */
+    const uint8_t *accused; /* per object: 1 if a method hid it. Lines to it that exact arithmetic refutes are
+                               told too, unconfirmed. What is searched does not depend on it. NULL: none */
     uint32_t threads;      /* 0: 1 */
 } truth_options;
 
@@ -33,7 +36,8 @@ typedef struct truth_result {
     truth_witness *culling;   /* per object */
     truth_witness *two_sided; /* per object */
     uint64_t rays;
-    uint32_t visible;         /* objects with a witness for either renderer */
+    uint32_t visible;         /* objects with a confirmed witness for either renderer */
+    uint32_t unconfirmed;     /* accused objects with an unconfirmed one only */
     uint32_t visible_culling, visible_two_sided;
     uint32_t rounds;          /* guided rounds until no new object appeared */
     bool budget_spent;        /* stopped by the budget, not because nothing new appeared */
