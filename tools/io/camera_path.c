@@ -17,7 +17,7 @@ void camera_path_free(camera_path *p)
 }
 
 /* Numbers of a line, separated by commas, blanks around them. Returns how many, or -1 when there is
- * anything else; *any says whether a number stands anywhere, which a header does not have. */
+ * anything else; *any says whether a field begins with a number, which none of a header does. */
 static int read_numbers(const char *line, const char *end, double number[6], bool *any)
 {
     int count = 0;
@@ -31,11 +31,11 @@ static int read_numbers(const char *line, const char *end, double number[6], boo
         }
         char *after = NULL;
         double value = p < stop ? strtod(p, &after) : 0.0;
-        bool is_number = p < stop && after != p && after <= stop;
+        bool is_number = p < stop && after != p && after <= stop && strchr("+-.0123456789", *p) != NULL;
+        *any = *any || is_number;
         for (; is_number && after < stop && isspace((unsigned char)*after); ++after) {
         }
         is_number = is_number && after == stop && isfinite(value);
-        *any = *any || is_number;
         clean = clean && is_number;
         if (is_number && count < 6) {
             number[count] = value;
