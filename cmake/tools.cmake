@@ -2,7 +2,6 @@
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(ASSIMP REQUIRED IMPORTED_TARGET assimp)
 pkg_check_modules(JANSSON REQUIRED IMPORTED_TARGET jansson)
-pkg_check_modules(POPT REQUIRED IMPORTED_TARGET popt)
 pkg_check_modules(MINIZIP REQUIRED IMPORTED_TARGET minizip)
 pkg_check_modules(PNG REQUIRED IMPORTED_TARGET libpng)
 pkg_check_modules(XXHASH REQUIRED IMPORTED_TARGET libxxhash)
@@ -29,7 +28,7 @@ if(UMB_PROGRAM_SOURCES)
   add_executable(umbrage-program ${UMB_PROGRAM_SOURCES})
   set_target_properties(umbrage-program PROPERTIES OUTPUT_NAME umbrage
                         RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR})
-  target_link_libraries(umbrage-program PRIVATE umb_truth umb_io PkgConfig::JANSSON PkgConfig::POPT
+  target_link_libraries(umbrage-program PRIVATE umb_truth umb_io PkgConfig::JANSSON
                         PkgConfig::XXHASH m)
 endif()
 

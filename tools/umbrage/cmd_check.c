@@ -71,7 +71,8 @@ static void count(tally *t, bool witness, bool confirmed, bool hidden)
 }
 
 /* Compare one answer with the truth; hidden has a byte for each object. */
-static bool compare(check *c, checked *v, const truth_result *r, const uint8_t *hidden, uint32_t objects)
+static bool compare(check *c, checked *v, const truth_result *r, const uint8_t *hidden,
+                    uint32_t objects)
 {
     for (uint32_t i = 0; i < objects; ++i) {
         const truth_witness *culling = &r->culling[i], *two_sided = &r->two_sided[i];
@@ -87,8 +88,8 @@ static bool compare(check *c, checked *v, const truth_result *r, const uint8_t *
     return true;
 }
 
-static int check_view(const setup *s, const options *o, truth *oracle, const umb_view *view, uint8_t *hidden,
-                      check *c, checked *out)
+static int check_view(const setup *s, const options *o, truth *oracle, const umb_view *view,
+                      uint8_t *hidden, check *c, checked *out)
 {
     umb_visible_set set;
     umb_error error = {0};
@@ -213,7 +214,8 @@ static void spread(const check *c, double *mean, double *largest)
     double sum = 0.0;
     *largest = 0.0;
     for (uint32_t k = 0; k < c->count; ++k) {
-        double ratio = conservativity(c->views[k].frame.stats.visible, c->views[k].tallies[EITHER].visible);
+        double ratio = conservativity(c->views[k].frame.stats.visible,
+                                      c->views[k].tallies[EITHER].visible);
         if (isfinite(ratio)) {
             sum += ratio;
             *largest = fmax(*largest, ratio);
@@ -279,8 +281,8 @@ static int print_text(const check *c, const setup *s, const options *o)
     spread(c, &mean, &largest);
     printf("%s (%s), index %s, %u objects\n\n", umb_method_name(o->method),
            umb_class_name(c->views[0].frame.class_), umb_index_kind_name(o->index), m->object_count);
-    printf("%6s %10s %10s %10s %6s %11s %8s %9s\n", "row", "in frustum", "reported", "truth", "wrong",
-           "unconfirmed", "ratio", "ms");
+    printf("%6s %10s %10s %10s %6s %11s %8s %9s\n", "row", "in frustum", "reported", "truth",
+           "wrong", "unconfirmed", "ratio", "ms");
     for (uint32_t k = 0; k < c->count; ++k) {
         if (k % step == 0 || k + 1 == c->count || c->views[k].tallies[EITHER].wrong > 0) {
             print_row(&c->views[k]);
@@ -302,9 +304,10 @@ static int print_text(const check *c, const setup *s, const options *o)
         double from[3], to[3];
         setup_to_file(m, w->witness.from, from);
         setup_to_file(m, w->witness.to, to);
-        printf("WRONG row %u hides object %u (%s): free from %.17g,%.17g,%.17g to %.17g,%.17g,%.17g (%s)\n",
-               w->row, w->object, m->objects[w->object].name, from[0], from[1], from[2], to[0], to[1], to[2],
-               w->renderer);
+        printf("WRONG row %u hides object %u (%s): free from %.17g,%.17g,%.17g to "
+               "%.17g,%.17g,%.17g (%s)\n",
+               w->row, w->object, m->objects[w->object].name, from[0], from[1], from[2], to[0],
+               to[1], to[2], w->renderer);
     }
     return EXIT_DONE;
 }

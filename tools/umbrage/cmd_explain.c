@@ -67,8 +67,8 @@ static int ask_oracle(const setup *s, const options *o, const umb_view *view, ex
         truth_result_free(&result);
     }
     if (code == EXIT_DONE && !out->seen) {
-        out->blocker_count =
-            truth_blockers(oracle, view, o->object, out->blockers, out->hits, MOST_BLOCKERS);
+        out->blocker_count = truth_blockers(oracle, view, o->object, out->blockers, out->hits,
+                                            MOST_BLOCKERS);
     }
     truth_destroy(oracle);
     free(accused);
@@ -150,8 +150,8 @@ static int print_text(const explanation *e, const setup *s, const options *o)
         double from[3], to[3];
         setup_to_file(m, e->witness.from, from);
         setup_to_file(m, e->witness.to, to);
-        printf("%-12s from %.9g,%.9g,%.9g to %.9g,%.9g,%.9g (%s%s)\n", "witness", from[0], from[1], from[2],
-               to[0], to[1], to[2], e->renderer, e->witness.confirmed ? ", exact" : "");
+        printf("%-12s from %.9g,%.9g,%.9g to %.9g,%.9g,%.9g (%s%s)\n", "witness", from[0], from[1],
+               from[2], to[0], to[1], to[2], e->renderer, e->witness.confirmed ? ", exact" : "");
     }
     for (uint32_t i = 0; i < e->blocker_count; ++i) {
         printf("%-12s %u (%s), %u rays\n", i == 0 ? "blockers" : "", e->blockers[i],

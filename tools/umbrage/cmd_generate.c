@@ -19,7 +19,8 @@ static int write_model(const model *m, const options *o)
         /* The message begins with the name that was written to, which is not the user's. */
         size_t length = strlen(place);
         bool named = strncmp(error.text, place, length) == 0;
-        int code = fail(o, EXIT_INPUT, "%s%s", named ? o->output : "", error.text + (named ? length : 0));
+        int code = fail(o, EXIT_INPUT, "%s%s", named ? o->output : "",
+                        error.text + (named ? length : 0));
         part_file_end(false);
         return code;
     }

@@ -15,7 +15,8 @@ static const struct {
     {"duplicate", "triangles twice in their mesh", offsetof(model_faults, duplicate)},
     {"opposite", "triangles twice, wound the other way", offsetof(model_faults, opposite)},
     {"border_edges", "edges of one triangle only", offsetof(model_faults, border_edges)},
-    {"non_manifold_edges", "edges of three triangles or more", offsetof(model_faults, non_manifold_edges)},
+    {"non_manifold_edges", "edges of three triangles or more",
+     offsetof(model_faults, non_manifold_edges)},
     {"bad_indices", "triangles that name no vertex", offsetof(model_faults, bad_indices)},
     {"inverted", "closed meshes that face inwards", offsetof(model_faults, inverted)},
     {"outlier_objects", "objects far outside the rest", offsetof(model_faults, outlier_objects)},
@@ -147,8 +148,8 @@ static void print_list(const model *m)
         const model_object *object = &m->objects[i];
         char bounds[128];
         object_box(m, object, box);
-        snprintf(bounds, sizeof bounds, "%.7g,%.7g,%.7g..%.7g,%.7g,%.7g", box[0][0], box[0][1], box[0][2],
-                 box[1][0], box[1][1], box[1][2]);
+        snprintf(bounds, sizeof bounds, "%.7g,%.7g,%.7g..%.7g,%.7g,%.7g", box[0][0], box[0][1],
+                 box[0][2], box[1][0], box[1][1], box[1][2]);
         printf("%8u %10llu  %-44s %s\n", i, (unsigned long long)object_triangles(m, object), bounds,
                object->name);
     }
@@ -165,19 +166,21 @@ static int print_text(const setup *s, const options *o)
     printf("%-12s %u\n", "objects", m->object_count);
     printf("%-12s %llu\n", "triangles", (unsigned long long)m->triangles);
     printf("%-12s %u\n", "shapes", m->mesh_count);
-    printf("%-12s %.9g,%.9g,%.9g to %.9g,%.9g,%.9g\n", "bounds", box[0][0], box[0][1], box[0][2], box[1][0],
-           box[1][1], box[1][2]);
+    printf("%-12s %.9g,%.9g,%.9g to %.9g,%.9g,%.9g\n", "bounds", box[0][0], box[0][1], box[0][2],
+           box[1][0], box[1][1], box[1][2]);
     printf("%-12s %g,%g,%g\n", "up", m->up[0], m->up[1], m->up[2]);
     printf("%-12s %.9g,%.9g,%.9g\n", "origin", m->origin[0], m->origin[1], m->origin[2]);
     printf("%-12s %u: %u welded from %u groups of touching objects\n", "occluders",
            umb_scene_occluder_count(s->scene), s->weld.occluders, s->weld.groups);
     printf("%-12s %.2f MiB scene, %.2f MiB index of %u nodes\n", "memory",
-           (double)umb_scene_memory(s->scene) / 1048576.0, (double)index.bytes / 1048576.0, index.nodes);
+           (double)umb_scene_memory(s->scene) / 1048576.0, (double)index.bytes / 1048576.0,
+           index.nodes);
     uint64_t all = 0;
     for (int i = 0; i < FAULT_COUNT; ++i) {
         uint64_t n = fault(m, i);
         if (n > 0) {
-            printf("%-12s %llu %s\n", all == 0 ? "faults" : "", (unsigned long long)n, faults[i].text);
+            printf("%-12s %llu %s\n", all == 0 ? "faults" : "", (unsigned long long)n,
+                   faults[i].text);
         }
         all += n;
     }

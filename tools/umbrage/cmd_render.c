@@ -11,7 +11,10 @@
 static const struct {
     uint32_t bit;
     const char *name;
-} kinds[] = {{PICTURE_EYE, "eye"}, {PICTURE_IDS, "ids"}, {PICTURE_OCCLUSION, "occlusion"}, {PICTURE_MAP, "map"}};
+} kinds[] = {{PICTURE_EYE, "eye"},
+             {PICTURE_IDS, "ids"},
+             {PICTURE_OCCLUSION, "occlusion"},
+             {PICTURE_MAP, "map"}};
 enum { KIND_COUNT = sizeof kinds / sizeof kinds[0] };
 
 /* What a picture is painted from. */
@@ -63,7 +66,8 @@ static int save(const options *o, const bitmap *im, const char *name)
     }
     bool good = bitmap_write_png(im, place, &error);
     if (!part_file_end(good) || !good) {
-        return fail(o, EXIT_INPUT, "%s: cannot be written; name a folder that exists and has space", name);
+        return fail(o, EXIT_INPUT, "%s: cannot be written; name a folder that exists and has space",
+                    name);
     }
     return EXIT_DONE;
 }

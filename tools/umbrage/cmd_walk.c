@@ -82,9 +82,10 @@ static int print_text(const walk *w, const options *o)
 {
     const frame *f = w->frames;
     uint32_t step = options_given(o, "list") ? 1 : (w->count + 19) / 20;
-    printf("%s (%s), index %s, %u objects\n\n", umb_method_name(f->method), umb_class_name(f->class_),
-           umb_index_kind_name(f->index), f->objects);
-    printf("%6s %10s %10s %10s %10s  %s\n", "row", "in frustum", "visible", "occluders", "ms", "hash");
+    printf("%s (%s), index %s, %u objects\n\n", umb_method_name(f->method),
+           umb_class_name(f->class_), umb_index_kind_name(f->index), f->objects);
+    printf("%6s %10s %10s %10s %10s  %s\n", "row", "in frustum", "visible", "occluders", "ms",
+           "hash");
     for (uint32_t k = 0; k < w->count; ++k) {
         if (k % step != 0 && k + 1 != w->count) {
             continue;
@@ -93,11 +94,12 @@ static int print_text(const walk *w, const options *o)
         printf("%6u %10u %10u %10u %10.3f  %016llx\n", f->row, f->in_frustum, f->stats.visible,
                f->stats.occluders, f->time_ms, (unsigned long long)f->hash);
         for (uint32_t i = 0; f->ids && i < f->stats.visible; ++i) {
-            printf("%s%u%s", i == 0 ? "       " : " ", f->ids[i], i + 1 == f->stats.visible ? "\n" : "");
+            printf("%s%u%s", i == 0 ? "       " : " ", f->ids[i],
+                   i + 1 == f->stats.visible ? "\n" : "");
         }
     }
-    printf("\n%u frames: median %.3f ms, p99 %.3f ms, mean visible %.1f of %.1f in the frustum\n", w->count,
-           w->median_ms, w->p99_ms, w->visible_mean, w->in_frustum_mean);
+    printf("\n%u frames: median %.3f ms, p99 %.3f ms, mean visible %.1f of %.1f in the frustum\n",
+           w->count, w->median_ms, w->p99_ms, w->visible_mean, w->in_frustum_mean);
     return EXIT_DONE;
 }
 

@@ -86,8 +86,9 @@ int frame_answer(const setup *s, const options *o, const umb_view *view, bool wi
     if (set) {
         *set = seen;
     }
-    return frame_hash(seen.objects, seen.count, &out->hash) ? EXIT_DONE
-                                                            : fail(o, EXIT_INPUT, "not enough memory");
+    return frame_hash(seen.objects, seen.count, &out->hash)
+               ? EXIT_DONE
+               : fail(o, EXIT_INPUT, "not enough memory");
 }
 
 int frame_count_in_frustum(const setup *s, const options *o, const umb_view *view, uint32_t *out)

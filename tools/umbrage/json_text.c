@@ -40,8 +40,11 @@ static void put_byte(json_text *j, char byte)
 /* Length of the well-formed UTF-8 sequence at s; 0: there is none. Shortest forms only, no surrogates. */
 static size_t sequence(const unsigned char *s)
 {
-    size_t more = s[0] < 0x80 ? 0 : s[0] >= 0xC2 && s[0] < 0xE0 ? 1 : s[0] >= 0xE0 && s[0] < 0xF0 ? 2
-                : s[0] >= 0xF0 && s[0] < 0xF5 ? 3 : 4;
+    size_t more = s[0] < 0x80                   ? 0
+                  : s[0] >= 0xC2 && s[0] < 0xE0 ? 1
+                  : s[0] >= 0xE0 && s[0] < 0xF0 ? 2
+                  : s[0] >= 0xF0 && s[0] < 0xF5 ? 3
+                                                : 4;
     if (more == 4) {
         return 0;
     }

@@ -10,7 +10,8 @@ static const command commands[COMMAND_COUNT] = {
                       cmd_info},
     [COMMAND_CULL] = {"cull", "SCENE", "--eye X,Y,Z --target X,Y,Z [options]",
                       "The visible set of one view", cmd_cull},
-    [COMMAND_WALK] = {"walk", "SCENE", "--path FILE [options]", "The visible set along a path", cmd_walk},
+    [COMMAND_WALK] = {"walk", "SCENE", "--path FILE [options]", "The visible set along a path",
+                      cmd_walk},
     [COMMAND_CHECK] = {"check", "SCENE", "--path FILE [options]",
                        "Compare visible sets with exact visibility, proven by rays", cmd_check},
     [COMMAND_EXPLAIN] = {"explain", "SCENE", "--eye X,Y,Z --target X,Y,Z --object ID [options]",
@@ -23,7 +24,8 @@ static const command commands[COMMAND_COUNT] = {
 
 static void print_help(void)
 {
-    puts("usage: umbrage SUBCOMMAND ...\n\nConservative visibility culling: nothing that can be seen is "
+    puts("usage: umbrage SUBCOMMAND ...\n\nConservative visibility culling: nothing that can be "
+         "seen is "
          "ever hidden.\n");
     for (int i = 0; i < COMMAND_COUNT; ++i) {
         printf("  %-10s %s\n", commands[i].name, commands[i].summary);

@@ -22,7 +22,8 @@ enum {
 static bool read_number(const char *text, const char **end, double *out)
 {
     char *stop;
-    size_t span = strspn(text, "+-.0123456789eE"); /* strtod also takes blanks, hexadecimal digits, words */
+    size_t span = strspn(
+        text, "+-.0123456789eE"); /* strtod also takes blanks, hexadecimal digits, words */
     if (span == 0) {
         return false;
     }
@@ -118,7 +119,8 @@ static const char *read_up(options *o, const char *text)
 
 static const char *read_fov(options *o, const char *text)
 {
-    return number(text, &o->fov) || !(o->fov > 0.0 && o->fov < 180.0) ? "degrees between 0 and 180" : NULL;
+    return number(text, &o->fov) || !(o->fov > 0.0 && o->fov < 180.0) ? "degrees between 0 and 180"
+                                                                      : NULL;
 }
 
 static const char *read_ortho(options *o, const char *text)
@@ -199,7 +201,8 @@ static const char *read_isa(options *o, const char *text)
     for (int i = 0; i < 5; ++i) {
         if (strcmp(text, names[i]) == 0) {
             o->isa = (umb_isa)i;
-            return umb_isa_available(o->isa) ? NULL : "another: this machine or build does not have it";
+            return umb_isa_available(o->isa) ? NULL
+                                             : "another: this machine or build does not have it";
         }
     }
     return "one of auto, scalar, sse4, avx2, neon";
@@ -258,7 +261,8 @@ static const char *read_grid(options *o, const char *text)
 
 static const char *read_rays(options *o, const char *text)
 {
-    return whole(text, (uint64_t)1 << 40, &o->rays) && o->rays > 0 ? NULL : "a number of rays from 1";
+    return whole(text, (uint64_t)1 << 40, &o->rays) && o->rays > 0 ? NULL
+                                                                   : "a number of rays from 1";
 }
 
 static const char *read_object(options *o, const char *text)
@@ -323,24 +327,30 @@ static const option_spec specs[] = {
     {"ortho", 0, VIEWS, "HEIGHT", read_ortho, "parallel lines; height of the view instead of --fov"},
     {"size", 0, VIEWS, "WxH", read_size, "the picture, square pixels (default 1024x512)"},
     {"near", 0, VIEWS, "D", read_near, "depth of the near plane (default 0.1)"},
-    {"far", 0, VIEWS, "D|inf", read_far, "depth of the far plane (default: the scene's farthest corner)"},
+    {"far", 0, VIEWS, "D|inf", read_far,
+     "depth of the far plane (default: the scene's farthest corner)"},
 
     {"method", 0, VIEWS, "NAME", read_method, "raster or none: frustum only (default raster)"},
     {"index", 0, SCENES, "NAME", read_index, "bvh or flat: no hierarchy (default bvh)"},
     {"buffer", 0, VIEWS, "WxH", read_buffer, "the method's own raster (default 1024x288)"},
-    {"min-pixels", 0, VIEWS, "P", read_min_pixels, "drop objects under P pixels both ways (default 0: none)"},
+    {"min-pixels", 0, VIEWS, "P", read_min_pixels,
+     "drop objects under P pixels both ways (default 0: none)"},
     {"no-weld", 0, SCENES, NULL, read_flag, "do not join touching objects into common occluders"},
-    {"threads", 0, SCENES, "N", read_threads, "threads to build and trace with (default 1)"},
-    {"isa", 0, VIEWS, "NAME", read_isa, "auto, scalar, sse4, avx2 or neon (default auto)"},
+    {"threads", 0, SCENES, "N", read_threads,
+     "threads to build and trace with (default 1)"},
+    {"isa", 0, VIEWS, "NAME", read_isa,
+     "auto, scalar, sse4, avx2 or neon (default auto)"},
 
     {"two-sided", 0, SCENES, NULL, read_two_sided, "faces block from both sides"},
     {"sky", 0, SCENES, NULL, read_sky, "keep sky surfaces; they block"},
     {"split", 0, SCENES, "N", read_split, "cut meshes into clusters of at most N triangles"},
-    {"seed", 0, SCENES | BIT(GENERATE), "N", read_seed, "seed of a generated scene and path that have one"},
+    {"seed", 0, SCENES | BIT(GENERATE), "N", read_seed,
+     "seed of a generated scene and path that have one"},
 
     {"list", 0, BIT(INFO) | BIT(CULL) | BIT(WALK), NULL, read_flag, "list the objects too"},
     {"repeat", 0, BIT(CULL), "N", read_repeat, "answers that the time is the median of (default 5)"},
-    {"grid", 0, BIT(CHECK) | BIT(EXPLAIN), "WxH", read_grid, "first rays of the oracle (default: --size)"},
+    {"grid", 0, BIT(CHECK) | BIT(EXPLAIN), "WxH", read_grid,
+     "first rays of the oracle (default: --size)"},
     {"rays", 0, BIT(CHECK) | BIT(EXPLAIN), "N", read_rays, "most guided rays a view (default 4M)"},
     {"object", 0, BIT(EXPLAIN), "ID", read_object, "the object to explain"},
     {"what", 0, BIT(RENDER), "KIND", read_what, "eye, ids, occlusion, map or all (default eye)"},
@@ -384,7 +394,8 @@ static const option_spec *find(const char *word, int which, const char **value)
     *value = word[length] == '=' ? word + length + 1 : NULL;
     for (int i = 0; i < SPEC_COUNT; ++i) {
         const option_spec *s = &specs[i];
-        bool named = word[1] == '-' ? length == strlen(s->name) + 2 && memcmp(word + 2, s->name, length - 2) == 0
+        bool named = word[1] == '-' ? length == strlen(s->name) + 2 &&
+                                          memcmp(word + 2, s->name, length - 2) == 0
                                     : length == 2 && s->letter && word[1] == s->letter;
         if (named && (s->commands >> which & 1)) {
             return s;
@@ -442,14 +453,16 @@ int options_read(const command *c, int which, int word_count, char **words, opti
         } else {
             const option_spec *s = find(word, which, &value);
             if (!s) {
-                return fail(out, EXIT_USAGE, "no option '%.60s'; umbrage %s --help lists them", word, c->name);
+                return fail(out, EXIT_USAGE, "no option '%.60s'; umbrage %s --help lists them",
+                            word, c->name);
             }
             if (!s->value && value) {
                 return fail(out, EXIT_USAGE, "--%s takes no value", s->name);
             }
             if (s->value && !value) {
                 if (++i == word_count) {
-                    return fail(out, EXIT_USAGE, "--%s needs a value: --%s %s", s->name, s->name, s->value);
+                    return fail(out, EXIT_USAGE, "--%s needs a value: --%s %s", s->name, s->name,
+                                s->value);
                 }
                 value = words[i];
             }
@@ -464,7 +477,8 @@ int options_read(const command *c, int which, int word_count, char **words, opti
         }
     }
     if (!out->input || !*out->input) {
-        return fail(out, EXIT_USAGE, "needs a %s: umbrage %s %s %s", c->input, c->name, c->input, c->usage);
+        return fail(out, EXIT_USAGE, "needs a %s: umbrage %s %s %s", c->input, c->name, c->input,
+                    c->usage);
     }
     return EXIT_DONE;
 }
@@ -477,8 +491,8 @@ void options_help(const command *c, int which)
         if (s->commands >> which & 1) {
             char left[64];
             int used = s->letter ? snprintf(left, sizeof left, "-%c, ", s->letter) : 0;
-            snprintf(left + used, sizeof left - (size_t)used, "--%s%s%s", s->name, s->value ? " " : "",
-                     s->value ? s->value : "");
+            snprintf(left + used, sizeof left - (size_t)used, "--%s%s%s", s->name,
+                     s->value ? " " : "", s->value ? s->value : "");
             printf("  %-20s %s\n", left, s->help);
         }
     }

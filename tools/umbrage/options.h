@@ -7,9 +7,9 @@
 /* Exit codes (docs/umbrage.1). */
 enum {
     EXIT_DONE = 0,
-    EXIT_CHECK = 1,       /* something visible was hidden, answers differ */
-    EXIT_USAGE = 2,       /* unknown name, impossible view */
-    EXIT_INPUT = 3,       /* an input cannot be read, an output cannot be written */
+    EXIT_CHECK = 1, /* something visible was hidden, answers differ */
+    EXIT_USAGE = 2, /* unknown name, impossible view */
+    EXIT_INPUT = 3, /* an input cannot be read, an output cannot be written */
     EXIT_INTERRUPTED = 4
 };
 

@@ -13,7 +13,7 @@ static char *volatile part; /* what an interrupt removes */
 static char *name;          /* what is being written */
 static char *whole;         /* what it is to become; NULL: it has its name already */
 static volatile sig_atomic_t held, pending; /* an interrupt waits; one is waiting */
-static pid_t owner; /* readers may fork; a child leaves without a word */
+static pid_t owner;                         /* readers may fork; a child leaves without a word */
 
 static void interrupted(int number)
 {
@@ -124,7 +124,8 @@ int part_file_write(const options *o, const char *path, const void *bytes, size_
         reason = errno;
         good = false;
     }
-    return good ? EXIT_DONE : fail(o, EXIT_INPUT, "%s: cannot be written: %s", path, strerror(reason));
+    return good ? EXIT_DONE
+                : fail(o, EXIT_INPUT, "%s: cannot be written: %s", path, strerror(reason));
 }
 
 int part_file_print(const options *o, json_text *j)

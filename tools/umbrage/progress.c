@@ -31,9 +31,9 @@ void progress_step(progress *p, uint32_t done)
     }
     double rate = done / (now - p->started + 1e-3) * 1e3;
     /* A terminal's line is written over, a log gets lines. */
-    fprintf(stderr, "%s%3.0f %%  %u of %u %s  %.3g a second  %.0f s left%s", p->terminal ? "\r\033[K" : "",
-            100.0 * done / p->total, done, p->total, p->what, rate, (p->total - done) / rate,
-            p->terminal ? "" : "\n");
+    fprintf(stderr, "%s%3.0f %%  %u of %u %s  %.3g a second  %.0f s left%s",
+            p->terminal ? "\r\033[K" : "", 100.0 * done / p->total, done, p->total, p->what, rate,
+            (p->total - done) / rate, p->terminal ? "" : "\n");
     fflush(stderr);
     p->shown = now;
     p->printed = true;

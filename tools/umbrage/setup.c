@@ -78,8 +78,8 @@ int setup_scene(setup *s, const options *o)
     if (!s->scene) {
         return fail(o, EXIT_INPUT, "%s: %s", o->input, s->error.text);
     }
-    umb_result result =
-        umb_index_create(s->scene, &(umb_index_def){.kind = o->index, .tasks = s->tasks}, &s->index);
+    umb_result result = umb_index_create(
+        s->scene, &(umb_index_def){.kind = o->index, .tasks = s->tasks}, &s->index);
     if (result != UMB_OK) {
         return fail(o, EXIT_INPUT, "%s: the index: %s", o->input, umb_result_name(result));
     }
@@ -99,7 +99,8 @@ static int setup_cullers(setup *s, const options *o)
     if (result == UMB_OK) {
         result = umb_culler_create(s->index, &def, &s->frustum);
     }
-    return result == UMB_OK ? EXIT_DONE : fail(o, EXIT_INPUT, "the culler: %s", umb_result_name(result));
+    return result == UMB_OK ? EXIT_DONE
+                            : fail(o, EXIT_INPUT, "the culler: %s", umb_result_name(result));
 }
 
 void setup_free(setup *s)
@@ -129,7 +130,8 @@ static double farthest_corner(const model *m, const double eye[3], double near_d
 {
     double square = 0.0;
     for (int i = 0; i < 3; ++i) {
-        double reach = fmax(fabs((double)m->bounds.min[i] - eye[i]), fabs((double)m->bounds.max[i] - eye[i]));
+        double reach = fmax(fabs((double)m->bounds.min[i] - eye[i]),
+                            fabs((double)m->bounds.max[i] - eye[i]));
         square += reach * reach;
     }
     double distance = sqrt(square) * (1.0 + 16.0 * DBL_EPSILON);
@@ -146,13 +148,14 @@ static umb_result make_view(const setup *s, const options *o, const double row[6
     }
     const double *up = options_given(o, "up") ? o->up : m->up;
     double aspect = (double)o->width / o->height;
-    double far_depth =
-        options_given(o, "far") ? o->far_depth : farthest_corner(m, eye, o->near_depth);
-    umb_result result =
-        options_given(o, "ortho")
-            ? umb_view_look_at_ortho(out, eye, target, up, o->ortho_height, aspect, o->near_depth, far_depth)
-            : umb_view_look_at(out, eye, target, up, o->fov * (3.14159265358979323846 / 180.0), aspect,
-                               o->near_depth, far_depth);
+    double far_depth = options_given(o, "far") ? o->far_depth
+                                               : farthest_corner(m, eye, o->near_depth);
+    umb_result result = options_given(o, "ortho")
+                            ? umb_view_look_at_ortho(out, eye, target, up, o->ortho_height, aspect,
+                                                     o->near_depth, far_depth)
+                            : umb_view_look_at(out, eye, target, up,
+                                               o->fov * (3.14159265358979323846 / 180.0), aspect,
+                                               o->near_depth, far_depth);
     if (result == UMB_OK) {
         out->width = o->width;
         out->height = o->height;

@@ -1,0 +1,23 @@
+# Exit code 1: contribution culling hides what can be seen, and check and explain prove it.
+. "$UMBRAGE_SOURCE/tests/cli/common.bash" || exit 1
+scene=gen:blocks,g=6
+rows="--path gen:blocks,g=6"
+
+run check $scene $rows --every 32 --grid 128x64 --rays 50k
+tail -n 4 out | sed -E 's/, budget spent.*//; s/[0-9.]+/N/g'
+run check $scene $rows --every 32 --grid 128x64 --rays 50k --min-pixels 40 --json
+jq -c '[.class, .wrongly_hidden > 0, .wrongly_hidden == (.wrong | length), (.wrong[0] | keys_unsorted)]' out
+row=$(jq '.wrong[0].row' out)
+object=$(jq '.wrong[0].object' out)
+run explain $scene $rows --row "$row" --object "$object" --min-pixels 40 --json --grid 128x64 --rays 50k |
+    sed -E 's/--(row|object) [0-9]+/--\1 N/g'
+jq -c '[.verdict, .truth, .witness.confirmed, .reason]' out
+run explain $scene $rows --row "$row" --object "$object" --json --grid 128x64 --rays 50k |
+    sed -E 's/--(row|object) [0-9]+/--\1 N/g'
+jq -c '[.verdict, .truth, .witness.confirmed, .reason]' out
+
+# What stands behind one building after another is hidden, and they are named.
+hidden=$("$umbrage" cull $scene $rows --row 5 --json --list | jq -c .ids >seen
+    "$umbrage" cull $scene $rows --row 5 --json --list --method none | jq --slurpfile seen seen '.ids - $seen[0] | .[-1]')
+"$umbrage" explain $scene $rows --row 5 --object "$hidden" --json --grid 128x64 --rays 50k |
+    jq -c '[.verdict, .truth, .reason, (.blockers | length > 0), (.blockers[0] | keys_unsorted)]'
