@@ -1,7 +1,7 @@
 # The front of the house: what each target does stands in scripts/ and in CMakePresets.json.
 # `make` alone lists the targets.
 JOBS ?= $(shell nproc)
-BUILD := cmake --build
+BUILD := env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL cmake --build
 CTEST := ctest -j $(JOBS) --output-on-failure --no-tests=error --test-dir
 
 .PHONY: help deps build demo test asan check matrix bench soak fuzz format tidy clean
