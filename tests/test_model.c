@@ -113,12 +113,14 @@ static void drops(void **state)
     model_free(m);
 }
 
-/* Whether all doubled areas are zero. Coordinates below 2^30: sums stay below 2^63. */
+__extension__ typedef __int128 wide;
+
+/* Whether all doubled areas are zero. Coordinates below 2^61: the products stay below 2^125. */
 static bool zero_area_of_integers(int64_t p[3][3])
 {
     for (int u = 0; u < 3; ++u) {
         int v = (u + 1) % 3;
-        if ((p[1][u] - p[0][u]) * (p[2][v] - p[0][v]) != (p[1][v] - p[0][v]) * (p[2][u] - p[0][u])) {
+        if ((wide)(p[1][u] - p[0][u]) * (p[2][v] - p[0][v]) != (wide)(p[1][v] - p[0][v]) * (p[2][u] - p[0][u])) {
             return false;
         }
     }
@@ -135,8 +137,8 @@ static void zero_area_is_exact(void **state)
         int64_t p[3][3];
         float f[3][3];
         for (int k = 0; k < 3; ++k) {
-            int shift = (int)random_below(&random, 20);
-            int64_t base = (int64_t)random_below(&random, 1u << 20);
+            int shift = (int)random_below(&random, 36);
+            int64_t base = (int64_t)random_below(&random, 1u << 10) * ((int64_t)1 << random_below(&random, 36));
             int64_t step = ((int64_t)random_below(&random, 64) - 32) * ((int64_t)1 << shift);
             p[0][k] = base;
             p[1][k] = base + step;
