@@ -1,4 +1,5 @@
-/* Generated scenes: counts, numbering, determinism, exact joints, and `blocks` against its recipe. */
+/* Generated scenes: counts, numbering, determinism, exact joints, and `blocks` against its
+ * recipe. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -55,8 +56,8 @@ static uint64_t count_triangles(const model *m)
     return sum;
 }
 
-/* Every edge is met as often in one direction as in the other. Compares positions, so parts that share
- * a corner by value count as joined. */
+/* Every edge is met as often in one direction as in the other. Compares positions, so parts that
+ * share a corner by value count as joined. */
 static void assert_closed(const model_mesh *mesh)
 {
     uint32_t n = 3 * mesh->triangle_count;
@@ -98,7 +99,8 @@ static void assert_solids(const model *m, uint32_t first_mesh)
     }
 }
 
-/* The recipe once more, written apart from the generator: draws a whole workload, keeps the boxes. */
+/* The recipe once more, written apart from the generator: draws a whole workload, keeps the
+ * boxes. */
 typedef struct recipe {
     float building[8][3];
     float prop[10][2][3];
@@ -215,8 +217,8 @@ static void test_blocks_path(void **state)
     camera_path_free(&p);
 }
 
-/* Floors of a building follow one another. Where neither is a deck and the plans are equal, the corners
- * at the joint are equal to the bit; decks meet from above. */
+/* Floors of a building follow one another. Where neither is a deck and the plans are equal, the
+ * corners at the joint are equal to the bit; decks meet from above. */
 static void test_city_floors_meet(void **state)
 {
     (void)state;
@@ -295,7 +297,8 @@ static void test_city_path(void **state)
         bool on_ground = false;
         for (uint32_t o = 0; o < m->object_count; ++o) {
             const umb_aabb *b = &m->objects[o].bounds;
-            bool over = e[0] >= b->min[0] && e[0] <= b->max[0] && e[2] >= b->min[2] && e[2] <= b->max[2];
+            bool over = e[0] >= b->min[0] && e[0] <= b->max[0] && e[2] >= b->min[2] &&
+                        e[2] <= b->max[2];
             assert_false(over && e[1] >= b->min[1] && e[1] <= b->max[1]);
             on_ground = on_ground || (over && b->max[1] == 0);
         }
@@ -322,7 +325,8 @@ static void test_boxfield(void **state)
             int k = (j + 1) % 3;
             side[j] = sqrt((double)t[0][j] * t[0][j] + (double)t[1][j] * t[1][j] +
                            (double)t[2][j] * t[2][j]);
-            double dot = (double)t[0][j] * t[0][k] + (double)t[1][j] * t[1][k] + (double)t[2][j] * t[2][k];
+            double dot = (double)t[0][j] * t[0][k] + (double)t[1][j] * t[1][k] +
+                         (double)t[2][j] * t[2][k];
             assert_true(side[j] > 1.9999 && side[j] < 100.0001);
             assert_true(fabs(dot) < 1e-2);
             largest = fmax(largest, side[j]);
@@ -342,8 +346,8 @@ static void test_boxfield(void **state)
     camera_path_free(&p);
 }
 
-/* The end of one wall piece is met by the pieces beside it: each corner of a panel's ends is a corner of
- * another wall piece too. */
+/* The end of one wall piece is met by the pieces beside it: each corner of a panel's ends is a
+ * corner of another wall piece too. */
 static void test_building_walls_meet(void **state)
 {
     (void)state;
@@ -414,18 +418,27 @@ static void test_determinism(void **state)
     assert_true(hash_spec("gen:city,triangles=50k,seed=7") == UINT64_C(0x25f6284dd9b67099));
     assert_true(hash_spec("gen:boxfield,polygons=20k") == UINT64_C(0x9eddb427f6546bed));
     assert_true(hash_spec("gen:building") == UINT64_C(0x308e5f275936a6d));
-    assert_true(hash_spec("gen:city,triangles=50k,seed=8") != hash_spec("gen:city,triangles=50k,seed=7"));
+    assert_true(hash_spec("gen:city,triangles=50k,seed=8") !=
+                hash_spec("gen:city,triangles=50k,seed=7"));
 }
 
 static void test_bad_specs(void **state)
 {
     (void)state;
     static const char *const bad[][2] = {
-        {"gen:", "blocks"},           {"gen:castle", "city"},          {"gen:city,size=3", "triangles"},
-        {"gen:blocks,g", "from 1"},   {"gen:blocks,g=0", "from 1"},    {"gen:blocks,g=-1", "from 1"},
-        {"gen:blocks,g=1.5", "g"},    {"gen:blocks,g=1e3", "g"},       {"gen:blocks,", "keys"},
-        {"gen:blocks,g=99999999999999999999", "from 1"},               {"gen:city,triangles=k", "triangles"},
-        {"gen:blocks,g=2,,g=3", "keys"}, {"blocks", "gen:NAME"},
+        {"gen:", "blocks"},
+        {"gen:castle", "city"},
+        {"gen:city,size=3", "triangles"},
+        {"gen:blocks,g", "from 1"},
+        {"gen:blocks,g=0", "from 1"},
+        {"gen:blocks,g=-1", "from 1"},
+        {"gen:blocks,g=1.5", "g"},
+        {"gen:blocks,g=1e3", "g"},
+        {"gen:blocks,", "keys"},
+        {"gen:blocks,g=99999999999999999999", "from 1"},
+        {"gen:city,triangles=k", "triangles"},
+        {"gen:blocks,g=2,,g=3", "keys"},
+        {"blocks", "gen:NAME"},
     };
     for (size_t k = 0; k < sizeof bad / sizeof bad[0]; ++k) {
         umb_error error = {0};
@@ -445,12 +458,11 @@ static void test_bad_specs(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_blocks_recipe), cmocka_unit_test(test_blocks_path),
-        cmocka_unit_test(test_city_floors_meet), cmocka_unit_test(test_city_counts),
-        cmocka_unit_test(test_city_path),     cmocka_unit_test(test_boxfield),
+        cmocka_unit_test(test_blocks_recipe),       cmocka_unit_test(test_blocks_path),
+        cmocka_unit_test(test_city_floors_meet),    cmocka_unit_test(test_city_counts),
+        cmocka_unit_test(test_city_path),           cmocka_unit_test(test_boxfield),
         cmocka_unit_test(test_building_walls_meet), cmocka_unit_test(test_building_path),
-        cmocka_unit_test(test_determinism),
-        cmocka_unit_test(test_bad_specs),
+        cmocka_unit_test(test_determinism),         cmocka_unit_test(test_bad_specs),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

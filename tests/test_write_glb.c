@@ -75,22 +75,23 @@ static uint32_t add_pair(model *m, uint8_t first, uint8_t second)
     return model_add_mesh(m, &mesh);
 }
 
-/* Flags of whole meshes survive; mixed ones become what hides least. An object without triangles keeps
- * its number. Names are escaped. */
+/* Flags of whole meshes survive; mixed ones become what hides least. An object without triangles
+ * keeps its number. Names are escaped. */
 static void test_flags_and_gaps(void **state)
 {
     (void)state;
     enum { TWO = UMB_TRIANGLE_TWO_SIDED, OPEN = UMB_TRIANGLE_OPEN };
-    static const uint8_t cases[][3] = {{0, 0, 0},       {TWO, TWO, TWO}, {OPEN, OPEN, OPEN},
-                                       {TWO, 0, 0},     {0, OPEN, OPEN}, {TWO | OPEN, TWO, TWO | OPEN},
+    static const uint8_t cases[][3] = {{0, 0, 0},          {TWO, TWO, TWO},
+                                       {OPEN, OPEN, OPEN}, {TWO, 0, 0},
+                                       {0, OPEN, OPEN},    {TWO | OPEN, TWO, TWO | OPEN},
                                        {TWO, OPEN, OPEN}};
     enum { COUNT = sizeof cases / sizeof cases[0] };
     umb_error error = {0};
     model *m = model_create();
     umb_transform t = {{{0.1f, 0, 0.3f, 1e-30f}, {0, -1.7f, 0, 5e8f}, {1.0f / 3.0f, 0, 1, -0.7f}}};
     for (uint32_t k = 0; k < COUNT; ++k) {
-        assert_int_equal(model_add_object(m, "a \"quoted\" \\ name\n \xC3\xA9", add_pair(m, cases[k][0], cases[k][1]),
-                                          k % 2 ? &t : NULL),
+        assert_int_equal(model_add_object(m, "a \"quoted\" \\ name\n \xC3\xA9",
+                                          add_pair(m, cases[k][0], cases[k][1]), k % 2 ? &t : NULL),
                          2 * k);
         assert_int_equal(model_add_object(m, "empty \xFF", MODEL_NONE, NULL), 2 * k + 1);
     }
@@ -132,7 +133,8 @@ static void test_failures(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_generated), cmocka_unit_test(test_flags_and_gaps),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_generated),
+                                       cmocka_unit_test(test_flags_and_gaps),
                                        cmocka_unit_test(test_failures)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -73,7 +73,8 @@ void bitmap_fill(bitmap *im, bitmap_color color)
     bitmap_rectangle(im, 0, 0, (int)im->width, (int)im->height, color, 1.0);
 }
 
-void bitmap_rectangle(bitmap *im, int x, int y, int width, int height, bitmap_color color, double opacity)
+void bitmap_rectangle(bitmap *im, int x, int y, int width, int height, bitmap_color color,
+                      double opacity)
 {
     int x1 = x + width < (int)im->width ? x + width : (int)im->width;
     int y1 = y + height < (int)im->height ? y + height : (int)im->height;
@@ -84,13 +85,14 @@ void bitmap_rectangle(bitmap *im, int x, int y, int width, int height, bitmap_co
     }
 }
 
-void bitmap_frame(bitmap *im, int x, int y, int width, int height, int thickness, bitmap_color color)
+void bitmap_frame(bitmap *im, int x, int y, int width, int height, int thickness,
+                  bitmap_color color)
 {
     bitmap_rectangle(im, x, y, width, thickness, color, 1.0);
     bitmap_rectangle(im, x, y + height - thickness, width, thickness, color, 1.0);
     bitmap_rectangle(im, x, y + thickness, thickness, height - 2 * thickness, color, 1.0);
-    bitmap_rectangle(im, x + width - thickness, y + thickness, thickness, height - 2 * thickness, color,
-                    1.0);
+    bitmap_rectangle(im, x + width - thickness, y + thickness, thickness, height - 2 * thickness,
+                     color, 1.0);
 }
 
 /* The pixels from first to last that an interval touches, within [0, size). */
@@ -100,7 +102,8 @@ static void pixel_range(double low, double high, uint32_t size, int *first, int 
     *last = high < size ? (high >= 0.0 ? (int)high : -1) : (int)size - 1;
 }
 
-/* Cut a segment to the picture and a margin around it (Liang and Barsky); false: nothing is left. */
+/* Cut a segment to the picture and a margin around it (Liang and Barsky); false: nothing is
+ * left. */
 static bool clip_segment(const bitmap *im, double margin, double p[4])
 {
     const double size[2] = {im->width, im->height};
@@ -124,8 +127,8 @@ static bool clip_segment(const bitmap *im, double margin, double p[4])
     return from <= to;
 }
 
-void bitmap_line(bitmap *im, double x0, double y0, double x1, double y1, double width, bitmap_color color,
-                double opacity)
+void bitmap_line(bitmap *im, double x0, double y0, double x1, double y1, double width,
+                 bitmap_color color, double opacity)
 {
     double p[4] = {x0, y0, x1, y1}, radius = width / 2;
     int top, bottom;
@@ -133,7 +136,8 @@ void bitmap_line(bitmap *im, double x0, double y0, double x1, double y1, double 
         return;
     }
     double dx = p[2] - p[0], dy = p[3] - p[1], square = dx * dx + dy * dy;
-    pixel_range(fmin(p[1], p[3]) - radius - 1, fmax(p[1], p[3]) + radius + 1, im->height, &top, &bottom);
+    pixel_range(fmin(p[1], p[3]) - radius - 1, fmax(p[1], p[3]) + radius + 1, im->height, &top,
+                &bottom);
     for (int y = top; y <= bottom; ++y) {
         /* The part of the line near this row bounds the pixels that can be touched. */
         double a = 0.0, b = 1.0;
@@ -184,7 +188,7 @@ static bool cut_row(const double (*c)[2], uint32_t count, double y, double *low,
 }
 
 void bitmap_polygon(bitmap *im, const double (*corners)[2], uint32_t count, bitmap_color color,
-                   double opacity)
+                    double opacity)
 {
     enum { ROWS = 4 }; /* samples of a pixel row; across, the cover is exact */
     double low_y = INFINITY, high_y = -INFINITY;
@@ -221,8 +225,8 @@ void bitmap_stretch(bitmap *im, const bitmap *from)
     for (uint32_t y = 0; y < im->height; ++y) {
         for (uint32_t x = 0; x < im->width; ++x) {
             bitmap_set(im, (int)x, (int)y,
-                      bitmap_get(from, (int)((uint64_t)x * from->width / im->width),
-                                (int)((uint64_t)y * from->height / im->height)));
+                       bitmap_get(from, (int)((uint64_t)x * from->width / im->width),
+                                  (int)((uint64_t)y * from->height / im->height)));
         }
     }
 }
@@ -234,7 +238,8 @@ void bitmap_shrink(bitmap *im, const bitmap *from, uint32_t factor)
         for (uint32_t x = 0; x < im->width; ++x) {
             uint32_t sum[3] = {area / 2, area / 2, area / 2};
             for (uint32_t k = 0; k < area; ++k) {
-                const uint8_t *p = pixel(from, (int)(x * factor + k % factor), (int)(y * factor + k / factor));
+                const uint8_t *p = pixel(from, (int)(x * factor + k % factor),
+                                         (int)(y * factor + k / factor));
                 for (int i = 0; p && i < 3; ++i) {
                     sum[i] += p[i];
                 }

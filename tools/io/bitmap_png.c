@@ -38,7 +38,8 @@ bool bitmap_write_png(const bitmap *im, const char *file, umb_error *error)
     }
     bool good = write_rows(f, im);
     if (!good) {
-        model_fail(error, UMB_ERROR_MEMORY, "%.150s: the picture could not be written; look for space", file);
+        model_fail(error, UMB_ERROR_MEMORY,
+                   "%.150s: the picture could not be written; look for space", file);
     }
     return output_close(f, file, good, error);
 }

@@ -25,8 +25,8 @@ void bitmap_text(bitmap *im, int x, int y, int scale, const char *text, bitmap_c
     int count = stb_easy_font_print(0, 0, copy, NULL, quads, (int)sizeof quads);
     for (int k = 0; k < count; ++k) {
         const float *a = quads + k * QUAD, *c = a + 2 * VERTEX;
-        bitmap_rectangle(im, x + (int)a[0] * scale, y + (int)a[1] * scale, (int)(c[0] - a[0]) * scale,
-                        (int)(c[1] - a[1]) * scale, color, 1.0);
+        bitmap_rectangle(im, x + (int)a[0] * scale, y + (int)a[1] * scale,
+                         (int)(c[0] - a[0]) * scale, (int)(c[1] - a[1]) * scale, color, 1.0);
     }
 }
 

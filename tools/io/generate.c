@@ -8,7 +8,7 @@
 #include "model_parts.h"
 
 static const generate_kind *const kinds[] = {&generate_blocks, &generate_city, &generate_boxfield,
-                                            &generate_building};
+                                             &generate_building};
 enum { KIND_COUNT = sizeof kinds / sizeof kinds[0] };
 
 /* What a spec says, ready to be run. */
@@ -78,23 +78,25 @@ static bool parse_pair(const char *text, size_t length, request *r, umb_error *e
         }
         if (!equals || !parse_number(equals + 1, length - name_length - 1, &r->values[k]) ||
             r->values[k] < key->min || r->values[k] > key->max) {
-            return model_fail(error, UMB_ERROR_ARGUMENT,
-                        "gen:%s: '%.*s': %s takes a whole number from %llu to %llu, k and M allowed",
-                        kind->name, (int)(length < 40 ? length : 40), text, key->name,
-                        (unsigned long long)key->min, (unsigned long long)key->max);
+            return model_fail(
+                error, UMB_ERROR_ARGUMENT,
+                "gen:%s: '%.*s': %s takes a whole number from %llu to %llu, k and M allowed",
+                kind->name, (int)(length < 40 ? length : 40), text, key->name,
+                (unsigned long long)key->min, (unsigned long long)key->max);
         }
         return true;
     }
-    return model_fail(error, UMB_ERROR_ARGUMENT, "gen:%s has no '%.*s'; its keys and their defaults: %s",
-                kind->name, (int)(name_length < 40 ? name_length : 40), text, list);
+    return model_fail(error, UMB_ERROR_ARGUMENT,
+                      "gen:%s has no '%.*s'; its keys and their defaults: %s", kind->name,
+                      (int)(name_length < 40 ? name_length : 40), text, list);
 }
 
 static bool parse(const char *spec, request *r, umb_error *error)
 {
     char list[160];
     if (strncmp(spec, "gen:", 4) != 0) {
-        return model_fail(error, UMB_ERROR_ARGUMENT, "'%.60s' is no generator: write gen:NAME,key=value",
-                    spec);
+        return model_fail(error, UMB_ERROR_ARGUMENT,
+                          "'%.60s' is no generator: write gen:NAME,key=value", spec);
     }
     const char *name = spec + 4;
     size_t length = strcspn(name, ",");
@@ -107,7 +109,7 @@ static bool parse(const char *spec, request *r, umb_error *error)
     if (!r->kind) {
         list_kinds(list, sizeof list);
         return model_fail(error, UMB_ERROR_ARGUMENT, "no generator '%.*s'; there are: %s",
-                    (int)(length < 40 ? length : 40), name, list);
+                          (int)(length < 40 ? length : 40), name, list);
     }
     for (int k = 0; k < GENERATE_MAX_KEYS; ++k) {
         r->values[k] = r->kind->keys[k].standard;
@@ -133,7 +135,8 @@ model *generate_model(const char *spec, const model_options *options, umb_error 
     model *m = model_create();
     if (!m || !r.kind->model(r.values, m)) {
         model_free(m);
-        model_fail(error, UMB_ERROR_MEMORY, "%.60s: not enough memory; ask for a smaller scene", spec);
+        model_fail(error, UMB_ERROR_MEMORY, "%.60s: not enough memory; ask for a smaller scene",
+                   spec);
         return NULL;
     }
     if (!model_finish(m, options, error)) {

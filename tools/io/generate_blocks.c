@@ -1,6 +1,7 @@
-/* `blocks`: a published benchmark workload. G x G turned buildings on a square grid, each with ten small
- * boxes around it. Random numbers are drawn in one stream, so the order of the draws is the recipe.
- * Objects: buildings first (row by row), then props: id = G*G + 10 * building + prop. */
+/* `blocks`: a published benchmark workload. G x G turned buildings on a square grid, each with
+ * ten small boxes around it. Random numbers are drawn in one stream, so the order of the draws
+ * is the recipe. Objects: buildings first (row by row), then props: id = G*G + 10 * building +
+ * prop. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -18,7 +19,8 @@ typedef struct block_prop {
     float min[3], max[3];
 } block_prop;
 
-/* Meshes of props, shared: a unit cube that reaches up or down from 0 along x (bit 0) and z (bit 1). */
+/* Meshes of props, shared: a unit cube that reaches up or down from 0 along x (bit 0) and z (bit
+ * 1). */
 typedef struct block_cubes {
     uint32_t mesh[4];
 } block_cubes;
@@ -76,9 +78,9 @@ static bool add_cubes(block_cubes *cubes, generate_mesh *g, model *m)
     return true;
 }
 
-/* The recipe's floats must come out of the transform to the bit. Placing the cube's corner at the end
- * that is nearer to zero makes the sum at the other end round back in nearly every case; where it does
- * not, the prop gets a mesh of its own. */
+/* The recipe's floats must come out of the transform to the bit. Placing the cube's corner at
+ * the end that is nearer to zero makes the sum at the other end round back in nearly every case;
+ * where it does not, the prop gets a mesh of its own. */
 static bool add_prop(model *m, generate_mesh *g, const block_cubes *cubes, const block_prop *p,
                      const char *name)
 {
@@ -167,5 +169,4 @@ static bool blocks_path(const uint64_t *values, camera_path *out)
     return true;
 }
 
-const generate_kind generate_blocks = {
-    "blocks", {{"g", 32, 1, 1000}}, blocks_model, blocks_path};
+const generate_kind generate_blocks = {"blocks", {{"g", 32, 1, 1000}}, blocks_model, blocks_path};

@@ -1,5 +1,6 @@
-/* `boxfield`: Leyvand's field of boxes of any size up to 100 units and any orientation, in a cube whose
- * size follows their number, with a clearing in its middle. A box counts as twelve polygons. */
+/* `boxfield`: Leyvand's field of boxes of any size up to 100 units and any orientation, in a
+ * cube whose size follows their number, with a clearing in its middle. A box counts as twelve
+ * polygons. */
 #include <math.h>
 #include <stdio.h>
 
@@ -7,8 +8,8 @@
 
 #define SIDE_MIN 2.0
 #define SIDE_MAX 100.0
-/* Space for each box: about a tenth of the field is filled, and a line of sight ends after some 230 units
- * in the mean. */
+/* Space for each box: about a tenth of the field is filled, and a line of sight ends after some
+ * 230 units in the mean. */
 #define VOLUME_PER_BOX 420000u
 #define CLEARING 100.0 /* radius */
 #define SMALLEST 500u  /* so that the clearing has something around it */
@@ -68,10 +69,9 @@ static umb_transform draw_box(uint64_t seed, uint32_t k, uint32_t size)
     } while (distance < keep * keep);
 
     double w = q[0], x = q[1], y = q[2], z = q[3];
-    const double turn[3][3] = {
-        {1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},
-        {2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)},
-        {2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}};
+    const double turn[3][3] = {{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},
+                               {2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)},
+                               {2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}};
     umb_transform t;
     for (int i = 0; i < 3; ++i) {
         for (int j = 0; j < 3; ++j) {

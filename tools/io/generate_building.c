@@ -1,15 +1,16 @@
-/* `building`: an office building in the manner of Soda Hall. Every floor is strips of two rows of rooms with
- * a corridor between them, joined by a corridor across their western ends:
+/* `building`: an office building in the manner of Soda Hall. Every floor is strips of two rows of
+ * rooms with a corridor between them, joined by a corridor across their western ends:
  *
  *   +---+-------+------+-----+        columns: 0 is the cross corridor, the others rooms
  *   |   | room  | room |     |        rows: room, corridor, room; room, corridor, room; ...
  *   |   +--  ---+-- ---+-- --+
- *   |     corridor           |        A wall is posts at the nodes of the grid and panels between them,
- *   |   +-- ----+--- --+-  --+        each an object. Panels and posts are cut at the same three
- *   |   |       |      |     |        heights, and all lengths are multiples of 1/16: neighbours share
- *   +---+-------+------+-----+        their end faces to the bit.
+ *   |     corridor           |        A wall is posts at the nodes of the grid and panels between
+ *   |   +-- ----+--- --+-  --+        them, each an object. Panels and posts are cut at the same
+ *   |   |       |      |     |        three heights, and all lengths are multiples of 1/16:
+ *   +---+-------+------+-----+        neighbours share their end faces to the bit.
  *
- * Rooms have one door to their corridor (some closed), some a door to the next room, few a window. */
+ * Rooms have one door to their corridor (some closed), some a door to the next room, few a
+ * window. */
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -89,19 +90,20 @@ static void lay_out(const uint64_t *values, building_plan *p)
     }
 }
 
-/* The panel on the low side of a cell: across x (the cell's west) or z (its north). A pure function of
- * the seed and the place, so that the path knows the doors too. */
-static building_panel draw_panel(const building_plan *p, uint32_t floor, uint32_t column, uint32_t row,
-                                 bool across_x)
+/* The panel on the low side of a cell: across x (the cell's west) or z (its north). A pure
+ * function of the seed and the place, so that the path knows the doors too. */
+static building_panel draw_panel(const building_plan *p, uint32_t floor, uint32_t column,
+                                 uint32_t row, bool across_x)
 {
     uint32_t line = across_x ? column : row, last = across_x ? p->columns : p->rows;
     bool outside = line == 0 || line == last;
     bool here = line < last && is_corridor(column, row);
     bool before = line > 0 && is_corridor(across_x ? column - 1 : column, across_x ? row : row - 1);
-    generate_random r =
-        generate_stream(p->seed, (int64_t)floor * 2 + across_x, (int64_t)row * 64 + column);
+    generate_random r = generate_stream(p->seed, (int64_t)floor * 2 + across_x,
+                                        (int64_t)row * 64 + column);
     building_panel out = {PANEL_SOLID, 0, 0, 0};
-    out.length = across_x ? p->z[row + 1] - p->z[row] - WALL : p->x[column + 1] - p->x[column] - WALL;
+    out.length = across_x ? p->z[row + 1] - p->z[row] - WALL
+                          : p->x[column + 1] - p->x[column] - WALL;
     uint32_t die = generate_below(&r, 100);
     if (outside) {
         out.kind = !here && !before && die < 25 ? PANEL_WINDOW : PANEL_SOLID;
@@ -119,9 +121,9 @@ static building_panel draw_panel(const building_plan *p, uint32_t floor, uint32_
     return out;
 }
 
-/* A slab of the given thickness over a grid of cells in x and y, some of them left out: one closed surface
- * whose corners are the grid's. Quads that face another slab's quad are cut along the same diagonal, also
- * after a quarter turn about y. */
+/* A slab of the given thickness over a grid of cells in x and y, some of them left out: one
+ * closed surface whose corners are the grid's. Quads that face another slab's quad are cut along
+ * the same diagonal, also after a quarter turn about y. */
 static void add_cells(generate_mesh *g, const double *x, uint32_t nx, const double *y, uint32_t ny,
                       uint32_t holes)
 {
@@ -142,13 +144,15 @@ static void add_cells(generate_mesh *g, const double *x, uint32_t nx, const doub
             generate_quad(g, v[0][i][j], v[1][i][j], v[1][i][j + 1], v[0][i][j + 1]);
         }
         if (!SOLID(i + 1, j)) {
-            generate_quad(g, v[0][i + 1][j], v[0][i + 1][j + 1], v[1][i + 1][j + 1], v[1][i + 1][j]);
+            generate_quad(g, v[0][i + 1][j], v[0][i + 1][j + 1], v[1][i + 1][j + 1],
+                          v[1][i + 1][j]);
         }
         if (!SOLID(i, j - 1)) {
             generate_quad(g, v[0][i][j], v[0][i + 1][j], v[1][i + 1][j], v[1][i][j]);
         }
         if (!SOLID(i, j + 1)) {
-            generate_quad(g, v[1][i][j + 1], v[1][i + 1][j + 1], v[0][i + 1][j + 1], v[0][i][j + 1]);
+            generate_quad(g, v[1][i][j + 1], v[1][i + 1][j + 1], v[0][i + 1][j + 1],
+                          v[0][i][j + 1]);
         }
     }
 #undef SOLID
@@ -200,7 +204,8 @@ static void put_box(building_maker *b, const char *what, double x0, double x1, d
     put(b, what, b->cube, &t);
 }
 
-/* Quarter turns about y, of what stands with its low corner at zero and its size in x and z given. */
+/* Quarter turns about y, of what stands with its low corner at zero and its size in x and z
+ * given. */
 static umb_transform turned(uint32_t quarter, double sx, double sz, double x, double y, double z)
 {
     static const int8_t c[4] = {1, 0, -1, 0}, s[4] = {0, -1, 0, 1};
@@ -213,7 +218,8 @@ static umb_transform turned(uint32_t quarter, double sx, double sz, double x, do
     return t;
 }
 
-static void put_panel(building_maker *b, uint32_t floor, uint32_t column, uint32_t row, bool across_x)
+static void put_panel(building_maker *b, uint32_t floor, uint32_t column, uint32_t row,
+                      bool across_x)
 {
     const building_plan *p = b->plan;
     building_panel panel = draw_panel(p, floor, column, row, across_x);
@@ -237,7 +243,8 @@ static void put_slab(building_maker *b, uint32_t floor, uint32_t column, uint32_
     double x0 = p->x[column] + (column ? WALL / 2 : 0), z0 = p->z[row] + (row ? WALL / 2 : 0);
     double x1 = p->x[column + 1] + (column + 1 < p->columns ? WALL / 2 : WALL);
     double z1 = p->z[row + 1] + (row + 1 < p->rows ? WALL / 2 : WALL);
-    put_box(b, floor < p->floors ? "slab" : "roof", x0, x1, floor * STOREY, floor * STOREY + SLAB, z0, z1);
+    put_box(b, floor < p->floors ? "slab" : "roof", x0, x1, floor * STOREY, floor * STOREY + SLAB,
+            z0, z1);
 }
 
 static void put_furniture(building_maker *b, uint32_t floor, uint32_t column, uint32_t row)
@@ -246,7 +253,8 @@ static void put_furniture(building_maker *b, uint32_t floor, uint32_t column, ui
     generate_random r = generate_stream(p->seed, -2 - (int64_t)floor, (int64_t)row * 64 + column);
     double taken[10][4];
     uint32_t count = 0, wanted = 4 + generate_below(&r, 6);
-    double x0 = p->x[column] + WALL, x1 = p->x[column + 1], z0 = p->z[row] + WALL, z1 = p->z[row + 1];
+    double x0 = p->x[column] + WALL, x1 = p->x[column + 1], z0 = p->z[row] + WALL,
+           z1 = p->z[row + 1];
     for (uint32_t attempt = 0; attempt < 40 && count < wanted; ++attempt) {
         uint32_t kind = generate_below(&r, FURNITURE), quarter = generate_below(&r, 4);
         double sx = furniture_size[kind][quarter & 1], sz = furniture_size[kind][!(quarter & 1)];
@@ -271,19 +279,23 @@ static void put_furniture(building_maker *b, uint32_t floor, uint32_t column, ui
     }
 }
 
-/* Boxes of each piece, in sixteenths: x0, x1, y0, y1, z0, z1. No two boxes share a whole edge: the pieces
- * are manifold. */
+/* Boxes of each piece, in sixteenths: x0, x1, y0, y1, z0, z1. No two boxes share a whole edge:
+ * the pieces are manifold. */
 static const struct {
     uint8_t kind, box[6];
 } furniture_boxes[] = {
-    {DESK, {0, 24, 11, 12, 0, 12}},   {DESK, {1, 2, 0, 11, 1, 11}},     {DESK, {16, 24, 1, 11, 1, 11}},
-    {DESK, {1, 16, 4, 11, 0, 1}},     {CHAIR, {0, 8, 7, 8, 0, 8}},      {CHAIR, {1, 7, 8, 16, 0, 1}},
-    {CHAIR, {0, 1, 0, 7, 0, 1}},      {CHAIR, {7, 8, 0, 7, 0, 1}},      {CHAIR, {0, 1, 0, 7, 7, 8}},
-    {CHAIR, {7, 8, 0, 7, 7, 8}},      {CABINET, {0, 12, 0, 22, 0, 8}},  {SHELF, {0, 20, 1, 23, 0, 1}},
-    {SHELF, {0, 1, 0, 24, 1, 6}},     {SHELF, {19, 20, 0, 24, 1, 6}},   {SHELF, {1, 19, 0, 1, 1, 5}},
-    {SHELF, {1, 19, 8, 9, 1, 5}},     {SHELF, {1, 19, 16, 17, 1, 5}},   {SHELF, {1, 19, 23, 24, 1, 5}},
-    {TABLE, {0, 20, 11, 12, 0, 20}},  {TABLE, {1, 3, 0, 11, 1, 3}},     {TABLE, {17, 19, 0, 11, 1, 3}},
-    {TABLE, {1, 3, 0, 11, 17, 19}},   {TABLE, {17, 19, 0, 11, 17, 19}},
+    {DESK, {0, 24, 11, 12, 0, 12}},   {DESK, {1, 2, 0, 11, 1, 11}},
+    {DESK, {16, 24, 1, 11, 1, 11}},   {DESK, {1, 16, 4, 11, 0, 1}},
+    {CHAIR, {0, 8, 7, 8, 0, 8}},      {CHAIR, {1, 7, 8, 16, 0, 1}},
+    {CHAIR, {0, 1, 0, 7, 0, 1}},      {CHAIR, {7, 8, 0, 7, 0, 1}},
+    {CHAIR, {0, 1, 0, 7, 7, 8}},      {CHAIR, {7, 8, 0, 7, 7, 8}},
+    {CABINET, {0, 12, 0, 22, 0, 8}},  {SHELF, {0, 20, 1, 23, 0, 1}},
+    {SHELF, {0, 1, 0, 24, 1, 6}},     {SHELF, {19, 20, 0, 24, 1, 6}},
+    {SHELF, {1, 19, 0, 1, 1, 5}},     {SHELF, {1, 19, 8, 9, 1, 5}},
+    {SHELF, {1, 19, 16, 17, 1, 5}},   {SHELF, {1, 19, 23, 24, 1, 5}},
+    {TABLE, {0, 20, 11, 12, 0, 20}},  {TABLE, {1, 3, 0, 11, 1, 3}},
+    {TABLE, {17, 19, 0, 11, 1, 3}},   {TABLE, {1, 3, 0, 11, 17, 19}},
+    {TABLE, {17, 19, 0, 11, 17, 19}},
 };
 
 static bool make_shapes(building_maker *b)
@@ -309,8 +321,8 @@ static bool make_shapes(building_maker *b)
     return ok;
 }
 
-/* One cell of a floor with what belongs to its low sides; cells one past the last column or row have
- * the outer walls. */
+/* One cell of a floor with what belongs to its low sides; cells one past the last column or row
+ * have the outer walls. */
 static void put_cell(building_maker *b, uint32_t floor, uint32_t column, uint32_t row)
 {
     const building_plan *p = b->plan;

@@ -1,18 +1,18 @@
-/* `city`: Leyvand's urban model. Square rings of blocks around the middle, each of 5 x 4 lots between a
- * street to its east, one to its south and their junction:
+/* `city`: Leyvand's urban model. Square rings of blocks around the middle, each of 5 x 4 lots
+ * between a street to its east, one to its south and their junction:
  *
  *      85           14
  *   +--------------+--+
- *   | lots of 17   |  |        A lot holds a building 9 to 12 units wide and long, turned by at most
- *   | 5 x 4        |  | 68     30 degrees (a side of at most 16.4: it never leaves its lot). A building
- *   +--------------+--+        is a stack of floors, each an object: a box or a solid in the shape of
- *   | street       |j.| 14     an L or a T, the lowest ones perhaps decks on pillars.
- *   +--------------+--+
+ *   | lots of 17   |  |        A lot holds a building 9 to 12 units wide and long, turned by at
+ *   | 5 x 4        |  | 68     most 30 degrees (a side of at most 16.4: it never leaves its lot).
+ *   +--------------+--+        A building is a stack of floors, each an object: a box or a solid
+ *   | street       |j.| 14     in the shape of an L or a T, the lowest ones perhaps decks on
+ *   +--------------+--+        pillars.
  *
- * Floors of one building share the turn's floats and their plan's corners, and storeys are multiples of a
- * quarter: so the top of one floor equals the bottom of the next to the bit. The ground is objects
- * too, one a block, street and junction, so that it can be culled. A building depends on the seed and its
- * lot only: a larger city contains the smaller ones. */
+ * Floors of one building share the turn's floats and their plan's corners, and storeys are
+ * multiples of a half: so the top of one floor equals the bottom of the next to the bit. The ground
+ * is objects too, one a block, street and junction, so that it can be culled. A building depends on
+ * the seed and its lot only: a larger city contains the smaller ones. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -33,12 +33,13 @@ enum { SIZES = 7, STOREYS = 3 };
 enum { GROUND_BLOCK, GROUND_EAST, GROUND_SOUTH, GROUND_JUNCTION, GROUNDS };
 
 typedef struct city_building {
-    double x, z;    /* its middle, always under a roof */
-    double c, s;    /* cosine and sine of its turn, quarter turns included */
+    double x, z;           /* its middle, always under a roof */
+    double c, s;           /* cosine and sine of its turn, quarter turns included */
     uint32_t width, depth; /* 0..6: 9 + half of that */
     uint32_t storey;       /* 0..2: 3 + half of that high */
     uint32_t lower, upper; /* plans */
-    uint32_t floors, decks, change; /* floors below decks are decks; from change on the plan is upper */
+    uint32_t floors, decks,
+        change; /* floors below decks are decks; from change on the plan is upper */
 } city_building;
 
 /* Outlines run counter-clockwise seen from above, in (x, -z). */
@@ -55,8 +56,14 @@ static const city_plan plans[PLANS] = {
      {{3, 4, 5}, {3, 5, 0}, {3, 0, 1}, {3, 1, 2}},
      6,
      1u << 3},
-    {{{-0.5, -0.125}, {-0.25, -0.125}, {-0.25, -0.5}, {0.25, -0.5},
-      {0.25, -0.125}, {0.5, -0.125},   {0.5, 0.5},    {-0.5, 0.5}},
+    {{{-0.5, -0.125},
+      {-0.25, -0.125},
+      {-0.25, -0.5},
+      {0.25, -0.5},
+      {0.25, -0.125},
+      {0.5, -0.125},
+      {0.5, 0.5},
+      {-0.5, 0.5}},
      {{1, 2, 3}, {1, 3, 4}, {1, 4, 6}, {4, 5, 6}, {1, 6, 7}, {1, 7, 0}},
      8,
      1u << 1 | 1u << 4},
@@ -72,9 +79,10 @@ typedef struct city_shapes {
 static bool draw_building(uint64_t seed, int bx, int bz, int lot, city_building *out)
 {
     generate_random r = generate_stream(seed, (int64_t)bx * LOTS + lot, bz);
-    static const uint8_t mix[20] = {PLAN_BOX, PLAN_BOX, PLAN_BOX, PLAN_BOX, PLAN_BOX, PLAN_BOX, PLAN_BOX,
-                                    PLAN_BOX, PLAN_BOX, PLAN_BOX, PLAN_BOX, PLAN_L,   PLAN_L,   PLAN_L,
-                                    PLAN_L,   PLAN_L,   PLAN_T,   PLAN_T,   PLAN_T,   PLAN_T};
+    static const uint8_t mix[20] = {PLAN_BOX, PLAN_BOX, PLAN_BOX, PLAN_BOX, PLAN_BOX,
+                                    PLAN_BOX, PLAN_BOX, PLAN_BOX, PLAN_BOX, PLAN_BOX,
+                                    PLAN_BOX, PLAN_L,   PLAN_L,   PLAN_L,   PLAN_L,
+                                    PLAN_L,   PLAN_T,   PLAN_T,   PLAN_T,   PLAN_T};
     bool built = generate_below(&r, 16) != 0; /* else a gap in the row */
     out->x = bx * PITCH_X + (lot % LOTS_X - (LOTS_X - 1) / 2.0) * LOT;
     out->z = bz * PITCH_Z + (lot / LOTS_X - (LOTS_Z - 1) / 2.0) * LOT;
@@ -123,7 +131,8 @@ static uint32_t building_triangles(const city_building *b)
     return sum;
 }
 
-static void add_solid(generate_mesh *g, const city_plan *p, double w, double d, double y0, double y1)
+static void add_solid(generate_mesh *g, const city_plan *p, double w, double d, double y0,
+                      double y1)
 {
     uint32_t low[8], high[8];
     for (uint32_t k = 0; k < p->corners; ++k) {
@@ -245,15 +254,23 @@ static void spiral(uint32_t n, int *bx, int *bz)
     }
     int at = (int)n - (2 * k - 1) * (2 * k - 1), step = at % (2 * k);
     switch (at / (2 * k)) {
-    case 0: *bx = k, *bz = -k + 1 + step; break;
-    case 1: *bx = k - 1 - step, *bz = k; break;
-    case 2: *bx = -k, *bz = k - 1 - step; break;
-    default: *bx = -k + 1 + step, *bz = -k; break;
+    case 0:
+        *bx = k, *bz = -k + 1 + step;
+        break;
+    case 1:
+        *bx = k - 1 - step, *bz = k;
+        break;
+    case 2:
+        *bx = -k, *bz = k - 1 - step;
+        break;
+    default:
+        *bx = -k + 1 + step, *bz = -k;
+        break;
     }
 }
 
-/* Build the city up to the first building that reaches the number of triangles asked for; with m NULL
- * only count. Returns the number of blocks begun, 0 when memory is short. */
+/* Build the city up to the first building that reaches the number of triangles asked for; with m
+ * NULL only count. Returns the number of blocks begun, 0 when memory is short. */
 static uint32_t build(uint64_t triangles, uint64_t seed, city_shapes *shapes, model *m)
 {
     uint64_t sum = 0;
@@ -300,8 +317,8 @@ static bool city_model(const uint64_t *values, model *m)
 
 enum { LEGS = 18, LEG_VIEWS = 4, ROOF_VIEWS = 12, AIR_VIEWS = 12 };
 
-/* A walk from junction to junction that never turns back and stays within reach of the middle. Each leg
- * gives four views: in the junction, looking across the corner, and along the street. */
+/* A walk from junction to junction that never turns back and stays within reach of the middle.
+ * Each leg gives four views: in the junction, looking across the corner, and along the street. */
 static bool look_streets(uint64_t seed, int reach, camera_path *out)
 {
     static const int8_t directions[4][2] = {{1, 0}, {0, 1}, {-1, 0}, {0, -1}};
@@ -314,7 +331,8 @@ static bool look_streets(uint64_t seed, int reach, camera_path *out)
         for (uint32_t k = 0; k < 4; ++k) {
             uint32_t h = (heading + turn + k) % 4;
             int ni = i + directions[h][0], nj = j + directions[h][1];
-            if (ni >= -reach && ni < reach && nj >= -reach && nj < reach && h != (heading + 2) % 4) {
+            bool near = ni >= -reach && ni < reach && nj >= -reach && nj < reach;
+            if (near && h != (heading + 2) % 4) {
                 heading = h;
                 break;
             }
@@ -326,7 +344,8 @@ static bool look_streets(uint64_t seed, int reach, camera_path *out)
             double k = side * sway[v];
             const double eye[3] = {(i + 0.5 + fx * t) * PITCH_X + off * fz, EYE_HEIGHT,
                                    (j + 0.5 + fz * t) * PITCH_Z + off * fx};
-            const double target[3] = {eye[0] + 50 * (fx - k * fz), EYE_HEIGHT, eye[2] + 50 * (fz + k * fx)};
+            const double target[3] = {eye[0] + 50 * (fx - k * fz), EYE_HEIGHT,
+                                      eye[2] + 50 * (fz + k * fx)};
             if (!generate_look(out, eye, target)) {
                 return false;
             }
@@ -367,7 +386,8 @@ static bool look_down(uint64_t seed, int reach, camera_path *out)
     for (int v = 0; v < AIR_VIEWS; ++v) {
         const double eye[3] = {size * (2 * generate_unit(&r) - 1), 160 + 20.0 * v,
                                size * (2 * generate_unit(&r) - 1)};
-        const double target[3] = {size * (generate_unit(&r) - 0.5), 0, size * (generate_unit(&r) - 0.5)};
+        const double target[3] = {size * (generate_unit(&r) - 0.5), 0,
+                                  size * (generate_unit(&r) - 0.5)};
         if (!generate_look(out, eye, target)) {
             return false;
         }
@@ -382,9 +402,12 @@ static bool city_path(const uint64_t *values, camera_path *out)
     while ((uint32_t)((2 * reach + 3) * (2 * reach + 3)) <= blocks) {
         ++reach;
     }
-    return look_streets(values[1], reach > 0 ? reach : 1, out) && look_roofs(values[1], reach, out) &&
-           look_down(values[1], reach, out);
+    return look_streets(values[1], reach > 0 ? reach : 1, out) &&
+           look_roofs(values[1], reach, out) && look_down(values[1], reach, out);
 }
 
 const generate_kind generate_city = {
-    "city", {{"triangles", 1000000, 1, 100000000}, {"seed", 7, 0, UINT32_MAX}}, city_model, city_path};
+    "city",
+    {{"triangles", 1000000, 1, 100000000}, {"seed", 7, 0, UINT32_MAX}},
+    city_model,
+    city_path};

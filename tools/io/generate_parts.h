@@ -1,9 +1,9 @@
 /* What the generators share: random numbers, small meshes, paths, the table of generators.
  *
  * A generated scene is the same to the bit on every machine: random numbers are our own, and all
- * arithmetic is +, -, *, / and square root, which IEEE 754 rounds exactly. (`blocks` alone calls sin and
- * cos, because its recipe does; a libm that differs in their last bit can move a float by one step.)
- */
+ * arithmetic is +, -, *, / and square root, which IEEE 754 rounds exactly. (`blocks` alone calls
+ * sin and cos, because its recipe does; a libm that differs in their last bit can move a float
+ * by one step.) / */
 #ifndef GENERATE_PARTS_H
 #define GENERATE_PARTS_H
 
@@ -54,7 +54,8 @@ void generate_quad(generate_mesh *g, uint32_t a, uint32_t b, uint32_t c, uint32_
 /* Twelve triangles on eight corners whose bits 0, 1, 2 choose the high x, y, z; facing outwards. */
 void generate_box_faces(generate_mesh *g, const uint32_t corners[8]);
 void generate_box(generate_mesh *g, const double min[3], const double max[3]);
-/* Move the mesh into the model and empty g for the next one. MODEL_NONE when memory is or was short. */
+/* Move the mesh into the model and empty g for the next one. MODEL_NONE when memory is or was
+ * short. */
 uint32_t generate_mesh_add(generate_mesh *g, model *m);
 void generate_mesh_free(generate_mesh *g);
 

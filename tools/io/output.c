@@ -10,8 +10,9 @@ FILE *output_open(const char *path, umb_error *error)
 {
     FILE *f = fopen(path, "wb");
     if (!f) {
-        model_fail(error, UMB_ERROR_ARGUMENT, "%.150s: cannot be written (%s); name a folder that exists",
-                   path, strerror(errno));
+        model_fail(error, UMB_ERROR_ARGUMENT,
+                   "%.150s: cannot be written (%s); name a folder that exists", path,
+                   strerror(errno));
     }
     return f;
 }
@@ -23,8 +24,8 @@ bool output_close(FILE *f, const char *path, bool good, umb_error *error)
     bool written = !ferror(f);
     written = fclose(f) == 0 && written;
     if (good && !written) {
-        model_fail(error, UMB_ERROR_MEMORY, "%.150s: not written (%s); look for space on the disk", path,
-                   strerror(errno));
+        model_fail(error, UMB_ERROR_MEMORY, "%.150s: not written (%s); look for space on the disk",
+                   path, strerror(errno));
     }
     if ((!good || !written) && ordinary) { /* a device is no half-written file */
         remove(path);

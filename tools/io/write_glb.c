@@ -5,11 +5,12 @@
 #include "model_parts.h"
 #include "output.h"
 
-/* The JSON is written as it comes and its length filled in afterwards: a city has a million nodes. */
+/* The JSON is written as it comes and its length filled in afterwards: a city has a million
+ * nodes. */
 typedef struct glb_writer {
     const model *m;
     FILE *f;
-    uint64_t bytes; /* of the binary chunk */
+    uint64_t bytes;   /* of the binary chunk */
     bool needs_point; /* some object has no mesh */
 } glb_writer;
 
@@ -28,8 +29,11 @@ static uint32_t mesh_material(const model_mesh *mesh)
 /* Length of the well-formed UTF-8 sequence at s; 0 if there is none. */
 static size_t sequence_length(const uint8_t *s)
 {
-    size_t n = s[0] < 0x80 ? 1 : s[0] >= 0xC2 && s[0] < 0xE0 ? 2 : s[0] >= 0xE0 && s[0] < 0xF0 ? 3
-               : s[0] >= 0xF0 && s[0] < 0xF5 ? 4 : 0;
+    size_t n = s[0] < 0x80                   ? 1
+               : s[0] >= 0xC2 && s[0] < 0xE0 ? 2
+               : s[0] >= 0xE0 && s[0] < 0xF0 ? 3
+               : s[0] >= 0xF0 && s[0] < 0xF5 ? 4
+                                             : 0;
     for (size_t k = 1; k < n; ++k) {
         if ((s[k] & 0xC0) != 0x80) {
             return 0;
@@ -116,24 +120,28 @@ static void write_nodes(const glb_writer *w)
     fputs("],\n", w->f);
 }
 
-/* Accessors 2k and 2k + 1 are the positions and indices of mesh k. One mesh more, a single point, stands for
- * objects without triangles, so that they keep their numbers. */
+/* Accessors 2k and 2k + 1 are the positions and indices of mesh k. One mesh more, a single
+ * point, stands for objects without triangles, so that they keep their numbers. */
 static void write_meshes(const glb_writer *w)
 {
     fputs("\"meshes\":[", w->f);
     for (uint32_t k = 0; k < w->m->mesh_count; ++k) {
         fprintf(w->f,
-                "%s\n{\"primitives\":[{\"attributes\":{\"POSITION\":%u},\"indices\":%u,\"material\":%u}]}",
+                "%s\n{\"primitives\":[{\"attributes\":{\"POSITION\":%u},\"indices\":%u,"
+                "\"material\":%u}]}",
                 k ? "," : "", 2 * k, 2 * k + 1, mesh_material(&w->m->meshes[k]));
     }
     if (w->needs_point) {
-        fprintf(w->f, "%s\n{\"primitives\":[{\"attributes\":{\"POSITION\":%u},\"mode\":0,\"material\":0}]}",
-                w->m->mesh_count ? "," : "", 2 * w->m->mesh_count);
+        fprintf(
+            w->f,
+            "%s\n{\"primitives\":[{\"attributes\":{\"POSITION\":%u},\"mode\":0,\"material\":0}]}",
+            w->m->mesh_count ? "," : "", 2 * w->m->mesh_count);
     }
     fputs("],\n\"materials\":[", w->f);
     for (uint32_t k = 0; k < MATERIALS; ++k) {
         fprintf(w->f, "%s{\"alphaMode\":\"%s\",\"doubleSided\":%s}", k ? "," : "",
-                k & UMB_TRIANGLE_OPEN ? "BLEND" : "OPAQUE", k & UMB_TRIANGLE_TWO_SIDED ? "true" : "false");
+                k & UMB_TRIANGLE_OPEN ? "BLEND" : "OPAQUE",
+                k & UMB_TRIANGLE_TWO_SIDED ? "true" : "false");
     }
     fputs("],\n", w->f);
 }
@@ -149,7 +157,8 @@ static void write_positions_accessor(FILE *f, uint64_t offset, const float *p, u
         }
     }
     fprintf(f,
-            "\n{\"bufferView\":0,\"byteOffset\":%llu,\"componentType\":5126,\"type\":\"VEC3\",\"count\":%u,"
+            "\n{\"bufferView\":0,\"byteOffset\":%llu,\"componentType\":5126,\"type\":\"VEC3\","
+            "\"count\":%u,"
             "\"min\":[%.9g,%.9g,%.9g],\"max\":[%.9g,%.9g,%.9g]}",
             (unsigned long long)offset, count, low[0], low[1], low[2], high[0], high[1], high[2]);
 }
@@ -163,10 +172,11 @@ static void write_accessors(glb_writer *w)
         fputs(k ? "," : "", w->f);
         write_positions_accessor(w->f, w->bytes, mesh->positions, mesh->position_count);
         w->bytes += 12 * (uint64_t)mesh->position_count;
-        fprintf(w->f,
-                ",\n{\"bufferView\":0,\"byteOffset\":%llu,\"componentType\":5125,\"type\":\"SCALAR\","
-                "\"count\":%u}",
-                (unsigned long long)w->bytes, 3 * mesh->triangle_count);
+        fprintf(
+            w->f,
+            ",\n{\"bufferView\":0,\"byteOffset\":%llu,\"componentType\":5125,\"type\":\"SCALAR\","
+            "\"count\":%u}",
+            (unsigned long long)w->bytes, 3 * mesh->triangle_count);
         w->bytes += 12 * (uint64_t)mesh->triangle_count;
     }
     if (w->needs_point) {
@@ -175,7 +185,8 @@ static void write_accessors(glb_writer *w)
         w->bytes += sizeof point;
     }
     fprintf(w->f,
-            "],\n\"bufferViews\":[{\"buffer\":0,\"byteLength\":%llu}],\"buffers\":[{\"byteLength\":%llu}]}",
+            "],\n\"bufferViews\":[{\"buffer\":0,\"byteLength\":%llu}],"
+            "\"buffers\":[{\"byteLength\":%llu}]}",
             (unsigned long long)w->bytes, (unsigned long long)w->bytes);
 }
 
@@ -186,7 +197,8 @@ static void write_word(FILE *f, uint32_t word)
     fwrite(bytes, 1, sizeof bytes, f);
 }
 
-/* Floats and indices are four bytes each; written through words so that every machine writes alike. */
+/* Floats and indices are four bytes each; written through words so that every machine writes
+ * alike. */
 static void write_words(FILE *f, const void *words, uint64_t count)
 {
     const uint8_t *at = words;
@@ -213,9 +225,9 @@ static bool write_chunks(glb_writer *w, const char *file, umb_error *error)
     }
     uint64_t total = (uint64_t)end + CHUNK + w->bytes;
     if (end < 0 || total > UINT32_MAX) {
-        return model_fail(error, UMB_ERROR_LIMIT,
-                          "%.150s: the scene needs more than the 4 GB of a GLB file; write a smaller one",
-                          file);
+        return model_fail(
+            error, UMB_ERROR_LIMIT,
+            "%.150s: the scene needs more than the 4 GB of a GLB file; write a smaller one", file);
     }
     write_word(w->f, (uint32_t)w->bytes);
     fwrite(binary_type, 1, 4, w->f);
@@ -243,7 +255,8 @@ bool write_glb(const model *m, const char *file, umb_error *error)
         w.needs_point = w.needs_point || m->objects[o].mesh == MODEL_NONE;
     }
     if (m->object_count == 0) {
-        return model_fail(error, UMB_ERROR_ARGUMENT, "%.150s: no object to write; choose another scene", file);
+        return model_fail(error, UMB_ERROR_ARGUMENT,
+                          "%.150s: no object to write; choose another scene", file);
     }
     w.f = output_open(file, error);
     return w.f && output_close(w.f, file, write_chunks(&w, file, error), error);

@@ -76,7 +76,8 @@ bool picture_ids(bitmap *im, truth *t, const umb_view *view, const uint8_t *stat
 /* Depth ramp: t 0 near, 1 far. */
 static bitmap_color ramp(double t)
 {
-    static const bitmap_color stops[] = {0xFFF4C2, 0xF7C873, 0xE98B57, 0xC2526A, 0x7C3B7D, 0x40377A, 0x22305C};
+    static const bitmap_color stops[] = {0xFFF4C2, 0xF7C873, 0xE98B57, 0xC2526A,
+                                         0x7C3B7D, 0x40377A, 0x22305C};
     enum { LAST = sizeof stops / sizeof stops[0] - 1 };
     double at = fmin(1, fmax(0, t)) * LAST;
     int k = at < LAST ? (int)at : LAST - 1;
@@ -107,8 +108,9 @@ static double ramp_place(const umb_view *view, double depth, double near_depth, 
     if (far_depth <= near_depth) {
         return 0;
     }
-    return view->projection == UMB_ORTHOGRAPHIC ? (depth - near_depth) / (far_depth - near_depth)
-                                                : log(depth / near_depth) / log(far_depth / near_depth);
+    return view->projection == UMB_ORTHOGRAPHIC
+               ? (depth - near_depth) / (far_depth - near_depth)
+               : log(depth / near_depth) / log(far_depth / near_depth);
 }
 
 static void draw_ramp_legend(bitmap *im, double near_depth, double far_depth)
@@ -119,7 +121,8 @@ static void draw_ramp_legend(bitmap *im, double near_depth, double far_depth)
     snprintf(high_text, sizeof high_text, "%.3g", far_depth);
     int low_width = bitmap_text_width(low, s), text_width = bitmap_text_width(high_text, s);
     int x = pad, y = (int)im->height - high - 3 * pad;
-    bitmap_rectangle(im, x, y, low_width + text_width + length + 3 * pad, high + 2 * pad, night, 0.75);
+    bitmap_rectangle(im, x, y, low_width + text_width + length + 3 * pad, high + 2 * pad, night,
+                     0.75);
     x += pad;
     y += pad;
     bitmap_text(im, x, y, s, low, 0xFFFFFF);
@@ -193,7 +196,8 @@ bool picture_occlusion(bitmap *im, const model *m, const umb_culler *culler, con
         bool covered = depth_range(view, values, count, &near_depth, &far_depth);
         for (size_t k = 0; k < count; ++k) {
             double at = isinf(values[k]) ? 0 : ramp_place(view, values[k], near_depth, far_depth);
-            bitmap_set(&buffer, (int)(k % width), (int)(k / width), isinf(values[k]) ? night : ramp(at));
+            bitmap_set(&buffer, (int)(k % width), (int)(k / width),
+                       isinf(values[k]) ? night : ramp(at));
         }
         bitmap_stretch(im, &buffer);
         if (boxes) {

@@ -5,11 +5,13 @@
 #include "picture.h"
 #include "picture_rays.h"
 
-static const bitmap_color horizon = 0xE4ECF0, zenith = 0x86A9C8, below = 0xCBD0CF, line_color = 0x20242B;
+static const bitmap_color horizon = 0xE4ECF0, zenith = 0x86A9C8, below = 0xCBD0CF,
+                          line_color = 0x20242B;
 
 /* Quiet stone, sand, slate and leaf. */
-static const bitmap_color object_colors[] = {0xE2D8C3, 0xD6C2A2, 0xC8B79A, 0xB9C6BA, 0xA9BDC8, 0xC6CEDA,
-                                            0xD9BCA8, 0xBFAA9F, 0xC8CCB2, 0xE3D6B6, 0xBAB4C6, 0xA8BAA9};
+static const bitmap_color object_colors[] = {0xE2D8C3, 0xD6C2A2, 0xC8B79A, 0xB9C6BA,
+                                             0xA9BDC8, 0xC6CEDA, 0xD9BCA8, 0xBFAA9F,
+                                             0xC8CCB2, 0xE3D6B6, 0xBAB4C6, 0xA8BAA9};
 
 typedef struct shader {
     const model *m;
@@ -33,7 +35,8 @@ static bitmap_color sky(const shader *s, const double direction[3])
                     : bitmap_mix(horizon, zenith, fmin(1, pow(1.4 * rise, 0.7)));
 }
 
-/* A quiet tint of its own for each object; where objects share faces, by the way that a face looks. */
+/* A quiet tint of its own for each object; where objects share faces, by the way that a face
+ * looks. */
 static bitmap_color surface_color(const shader *s, const picture_hit *hit)
 {
     static const bitmap_color neutral = 0xE4DED2, stone = 0xD9CDB8, slate = 0xC3CCD2;
@@ -45,10 +48,12 @@ static bitmap_color surface_color(const shader *s, const picture_hit *hit)
         return bitmap_mix(neutral, turn > 0 ? stone : slate, fmin(1, 1.6 * fabs(turn)));
     }
     uint32_t h = (hit->object ^ hit->object >> 7) * 2654435761u >> 16;
-    return bitmap_mix(object_colors[h % (sizeof object_colors / sizeof object_colors[0])], neutral, 0.35);
+    return bitmap_mix(object_colors[h % (sizeof object_colors / sizeof object_colors[0])], neutral,
+                      0.35);
 }
 
-/* Light from the viewer's side, from above and from a sun, so that no two walls of a corner look alike. */
+/* Light from the viewer's side, from above and from a sun, so that no two walls of a corner look
+ * alike. */
 static bitmap_color shade(const shader *s, const picture_hit *hit, double x, double y)
 {
     double direction[3], normal[3] = {hit->normal[0], hit->normal[1], hit->normal[2]}, height = 0;
@@ -69,8 +74,8 @@ static bitmap_color shade(const shader *s, const picture_hit *hit, double x, dou
     return bitmap_mix(c, horizon, 0.8 * (1 - exp(-hit->depth / s->haze)));
 }
 
-/* How differently two neighbouring pixels look: 0 alike, 1 a fold of a surface, 2 another object, 3 an
- * edge with depth behind it. */
+/* How differently two neighbouring pixels look: 0 alike, 1 a fold of a surface, 2 another
+ * object, 3 an edge with depth behind it. */
 static int difference(const picture_hit *a, const picture_hit *b, bool shared)
 {
     if (a->object == MODEL_NONE && b->object == MODEL_NONE) {
@@ -79,7 +84,8 @@ static int difference(const picture_hit *a, const picture_hit *b, bool shared)
     if (a->object == MODEL_NONE || b->object == MODEL_NONE) {
         return 3;
     }
-    double cosine = a->normal[0] * b->normal[0] + a->normal[1] * b->normal[1] + a->normal[2] * b->normal[2];
+    double cosine = a->normal[0] * b->normal[0] + a->normal[1] * b->normal[1] +
+                    a->normal[2] * b->normal[2];
     bool jump = fabs(a->depth - b->depth) > 0.08 * fmin(a->depth, b->depth);
     if (cosine > 0.999) {
         /* One plane seen at a grazing angle changes depth quickly too. */
@@ -109,7 +115,8 @@ static bitmap_color refine(const shader *s, uint32_t x, uint32_t y, const bitmap
     enum { GRID = 3 };
     uint32_t sum[3] = {GRID * GRID / 2, GRID * GRID / 2, GRID * GRID / 2};
     for (int k = 0; k < GRID * GRID; ++k) {
-        double u = (x + (k % GRID + 0.5) / GRID) / im->width, v = (y + (k / GRID + 0.5) / GRID) / im->height;
+        double u = (x + (k % GRID + 0.5) / GRID) / im->width,
+               v = (y + (k / GRID + 0.5) / GRID) / im->height;
         picture_hit hit = picture_rays_one(s->t, s->view, u, v);
         bitmap_color c = shade(s, &hit, u, v);
         for (int i = 0; i < 3; ++i) {
@@ -145,7 +152,8 @@ static shader make_shader(const model *m, truth *t, const umb_view *view)
     }
     uint64_t triangles = 0;
     for (uint32_t o = 0; o < m->object_count; ++o) {
-        triangles += m->objects[o].mesh != MODEL_NONE ? m->meshes[m->objects[o].mesh].triangle_count : 0;
+        triangles += m->objects[o].mesh != MODEL_NONE ? m->meshes[m->objects[o].mesh].triangle_count
+                                                      : 0;
     }
     s.shared = triangles > m->triangles;
     s.haze = fmax(0.5 * sqrt(size), 1e-6);
@@ -164,10 +172,12 @@ bool picture_eye(bitmap *im, const model *m, truth *t, const umb_view *view)
         for (uint32_t x = 0; x < im->width; ++x) {
             const picture_hit *hit = rays.hits + (size_t)y * rays.width + x;
             double u = (x + 0.5) / im->width, v = (y + 0.5) / im->height;
-            bitmap_color c = edge_at(&rays, x, y, s.shared, true) ? refine(&s, x, y, im) : shade(&s, hit, u, v);
+            bitmap_color c = edge_at(&rays, x, y, s.shared, true) ? refine(&s, x, y, im)
+                                                                  : shade(&s, hit, u, v);
             int edge = edge_at(&rays, x, y, s.shared, false);
             double fade = exp(-2 * (hit->object == MODEL_NONE ? 0 : hit->depth) / s.haze);
-            bitmap_set(im, (int)x, (int)y, bitmap_mix(c, line_color, line_strength[edge] * (0.35 + 0.65 * fade)));
+            bitmap_set(im, (int)x, (int)y,
+                       bitmap_mix(c, line_color, line_strength[edge] * (0.35 + 0.65 * fade)));
         }
     }
     picture_rays_free(&rays);

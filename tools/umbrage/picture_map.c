@@ -13,8 +13,9 @@ static const char *const state_names[3] = {"outside the view", "hidden", "visibl
 
 /* What lies under a fine pixel. */
 typedef struct map_pixel {
-    float height, seen_height, ground; /* of the topmost surface, the topmost visible one, the lowest */
-    uint32_t object, seen;             /* MODEL_NONE: nothing */
+    float height, seen_height,
+        ground;            /* of the topmost surface, the topmost visible one, the lowest */
+    uint32_t object, seen; /* MODEL_NONE: nothing */
     uint8_t light;
 } map_pixel;
 
@@ -24,10 +25,10 @@ typedef struct map {
     int across, down, up; /* axes of the page and of height */
     double across_sign, down_sign, up_sign;
     double left, top, scale; /* fine pixels = (coordinate - left) * scale */
-    double cut;           /* heights above are cut away */
-    double low, high;     /* heights between which the shade runs */
+    double cut;              /* heights above are cut away: faint, and under all others */
+    double low, high;        /* heights between which the shade runs */
     uint32_t width, height;
-    double tie;           /* heights nearer than this are equal */
+    double tie; /* heights nearer than this are equal */
     const uint8_t *states;
     map_pixel *pixels;
 } map;
@@ -44,8 +45,8 @@ static void choose_axes(map *p)
 {
     const double *up = p->m->up;
     p->up = fabs(up[2]) >= fabs(up[1]) && fabs(up[2]) >= fabs(up[0]) ? 2
-            : fabs(up[1]) >= fabs(up[0])                            ? 1
-                                                                    : 0;
+            : fabs(up[1]) >= fabs(up[0])                             ? 1
+                                                                     : 0;
     p->up_sign = up[p->up] < 0 ? -1 : 1;
     p->across = p->up == 0 ? 1 : 0;
     p->down = p->up == 2 ? 1 : 2;
@@ -59,8 +60,9 @@ static int compare_floats(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* The span that holds all but the outermost hundredth of the objects' boxes at either end, or, where the
- * outer tenths lie far out, little more than the rest: a few stray objects must not shrink the map to a dot. */
+/* The span that holds all but the outermost hundredth of the objects' boxes at either end, or,
+ * where the outer tenths lie far out, little more than the rest: a few stray objects must not
+ * shrink the map to a dot. */
 static bool span_of(const model *m, int axis, double sign, double *low, double *high)
 {
     float *ends = malloc(2 * sizeof *ends * ((size_t)m->object_count + 1));
@@ -99,8 +101,8 @@ static bool span_of(const model *m, int axis, double sign, double *low, double *
 /* The part of the world on the page: the scene's span and the eye, with a margin, centred. */
 static bool choose_window(map *p, uint32_t width, uint32_t height)
 {
-    double low[2], high[2], eye[2] = {p->across_sign * p->view->eye[p->across],
-                                      p->down_sign * p->view->eye[p->down]};
+    double low[2], high[2],
+        eye[2] = {p->across_sign * p->view->eye[p->across], p->down_sign * p->view->eye[p->down]};
     if (!span_of(p->m, p->across, p->across_sign, &low[0], &high[0]) ||
         !span_of(p->m, p->down, p->down_sign, &low[1], &high[1]) ||
         !span_of(p->m, p->up, p->up_sign, &p->low, &p->high)) {
@@ -118,22 +120,29 @@ static bool choose_window(map *p, uint32_t width, uint32_t height)
     return true;
 }
 
-/* Of surfaces at the same height the visible one wins: faces may belong to several objects. */
+/* What lies above the cut is kept only where nothing lies below it. Of surfaces at the same
+ * height the visible one wins: faces may belong to several objects. */
 static void lay(map *p, int x, int y, double z, uint32_t object, uint8_t light)
 {
     if (x < 0 || y < 0 || (uint32_t)x >= p->width || (uint32_t)y >= p->height) {
         return;
     }
     map_pixel *at = p->pixels + (size_t)y * p->width + (size_t)x;
-    bool seen = p->states[object] == PICTURE_VISIBLE;
-    if (at->object == MODEL_NONE || z > at->height + p->tie ||
-        (z > at->height - p->tie && p->states[object] > p->states[at->object])) {
+    bool first = at->object == MODEL_NONE, cut = z > p->cut;
+    bool was_cut = !first && at->height > p->cut;
+    bool higher = z > at->height + p->tie ||
+                  (z > at->height - p->tie && !first && p->states[object] > p->states[at->object]);
+    if (first || (cut == was_cut ? higher : was_cut)) {
+        at->ground = first || was_cut ? (float)z : at->ground;
         at->height = (float)z;
-        at->ground = at->object == MODEL_NONE ? (float)z : at->ground;
         at->object = object;
         at->light = light;
     }
-    if (seen && (at->seen == MODEL_NONE || z > at->seen_height + p->tie)) {
+    if (cut) {
+        return;
+    }
+    if (p->states[object] == PICTURE_VISIBLE &&
+        (at->seen == MODEL_NONE || z > at->seen_height + p->tie)) {
         at->seen_height = (float)z;
         at->seen = object;
     }
@@ -145,6 +154,8 @@ static void draw_wall(map *p, double v[3][3], uint32_t object)
 {
     int from = 0;
     double longest = -1, top = fmax(v[0][2], fmax(v[1][2], v[2][2]));
+    double foot = fmin(v[0][2], fmin(v[1][2], v[2][2])),
+           height = foot > p->cut ? top : fmin(top, p->cut);
     for (int i = 0; i < 3; ++i) {
         int j = (i + 1) % 3;
         double length = hypot(v[j][0] - v[i][0], v[j][1] - v[i][1]);
@@ -159,7 +170,7 @@ static void draw_wall(map *p, double v[3][3], uint32_t object)
         double t = steps ? s / (double)steps : 0;
         double x = a[0] + (b[0] - a[0]) * t, y = a[1] + (b[1] - a[1]) * t;
         if (x > -1 && y > -1 && x < p->width && y < p->height) {
-            lay(p, (int)x, (int)y, fmin(top, p->cut), object, 90);
+            lay(p, (int)x, (int)y, height, object, 90);
         }
     }
 }
@@ -185,12 +196,11 @@ static void draw_surface(map *p, double v[3][3], uint32_t object, uint8_t light)
                 high = fmax(high, x);
             }
         }
-        int left = (int)fmax(0, ceil(low - 0.5)), right = (int)fmin(p->width - 1.0, floor(high - 0.5));
+        int left = (int)fmax(0, ceil(low - 0.5)),
+            right = (int)fmin(p->width - 1.0, floor(high - 0.5));
         for (int x = left; low <= high && x <= right; ++x) {
             double z = v[0][2] + across * (x + 0.5 - v[0][0]) + down * (y - v[0][1]);
-            if (z <= p->cut) {
-                lay(p, x, row, z, object, light);
-            }
+            lay(p, x, row, z, object, light);
         }
     }
 }
@@ -238,9 +248,6 @@ static void draw_object(map *p, uint32_t object)
         }
         double rise = p->up_sign * normal[p->up];
         bool both = p->m->meshes[o->mesh].flags[k] & UMB_TRIANGLE_TWO_SIDED;
-        if (fmin(page[0][2], fmin(page[1][2], page[2][2])) > p->cut) {
-            continue;
-        }
         if (fabs(rise) < 0.05) {
             draw_wall(p, page, object);
         } else if (rise > 0 || both) {
@@ -264,7 +271,8 @@ static double choose_cut(const map *p)
             low[i] = object->bounds.min[i];
             high[i] = object->bounds.max[i];
         }
-        if (object->mesh == MODEL_NONE || fmax(p->up_sign * low[p->up], p->up_sign * high[p->up]) < eye[2] ||
+        if (object->mesh == MODEL_NONE ||
+            fmax(p->up_sign * low[p->up], p->up_sign * high[p->up]) < eye[2] ||
             p->view->eye[p->across] < low[p->across] || p->view->eye[p->across] > high[p->across] ||
             p->view->eye[p->down] < low[p->down] || p->view->eye[p->down] > high[p->down]) {
             continue;
@@ -272,13 +280,15 @@ static double choose_cut(const map *p)
         bool mirrored = model_mirrored(object);
         for (uint32_t k = 0; k < p->m->meshes[object->mesh].triangle_count; ++k) {
             double v[3][3], normal[3], q[3][3], w[3], z = 0;
-            if (!triangle_of(p->m, object, k, mirrored, v, normal) || p->up_sign * normal[p->up] < 0.05) {
+            if (!triangle_of(p->m, object, k, mirrored, v, normal) ||
+                p->up_sign * normal[p->up] < 0.05) {
                 continue;
             }
             for (int i = 0; i < 3; ++i) {
                 place(p, v[i], q[i]);
             }
-            double area = (q[1][0] - q[0][0]) * (q[2][1] - q[0][1]) - (q[2][0] - q[0][0]) * (q[1][1] - q[0][1]);
+            double area = (q[1][0] - q[0][0]) * (q[2][1] - q[0][1]) -
+                          (q[2][0] - q[0][0]) * (q[1][1] - q[0][1]);
             bool inside = area != 0;
             for (int i = 0; i < 3; ++i) {
                 const double *a = q[(i + 1) % 3], *b = q[(i + 2) % 3];
@@ -294,8 +304,8 @@ static double choose_cut(const map *p)
     return INFINITY;
 }
 
-/* What a pixel shows. A visible storey shows through hidden ones above it; the visible ground does not
- * show through what stands on it. */
+/* What a pixel shows. A visible storey shows through hidden ones above it; the visible ground
+ * does not show through what stands on it. */
 static uint32_t shown(const map *p, const map_pixel *at)
 {
     return at->seen != MODEL_NONE && at->seen_height > at->ground + p->tie ? at->seen : at->object;
@@ -319,11 +329,14 @@ static void paint(const map *p, bitmap *fine)
                 bitmap_blend(fine, (int)x, (int)y, ink, edge ? 0.3 : 0);
                 continue;
             }
-            double rise = fmin(1, fmax(0, (at->height - p->low) / (fmin(p->high, p->cut) - p->low + 1e-30)));
+            bool cut = at->height > p->cut;
+            double rise = fmin(
+                1, fmax(0, (at->height - p->low) / (fmin(p->high, p->cut) - p->low + 1e-30)));
             bitmap_color c = state_colors[p->states[shown(p, at)]];
             c = bitmap_mix(c, 0xFFFFFF, 0.30 * rise);
             c = bitmap_mix(c, ink, 0.55 * (1 - at->light / 255.0));
-            bitmap_set(fine, (int)x, (int)y, edge ? bitmap_mix(c, ink, 0.35) : c);
+            c = edge ? bitmap_mix(c, ink, 0.35) : c;
+            bitmap_set(fine, (int)x, (int)y, cut ? bitmap_mix(c, paper, 0.65) : c);
         }
     }
 }
@@ -356,8 +369,8 @@ static uint32_t hull(double (*points)[2], uint32_t count, double (*out)[2])
     return n;
 }
 
-/* The frustum's shadow on the page in fine pixels: the hull of the eye and of the corners at the near
- * plane and far away. */
+/* The frustum's shadow on the page in fine pixels: the hull of the eye and of the corners at the
+ * near plane and far away. */
 static uint32_t wedge(const map *p, double outline[9][2])
 {
     const umb_view *view = p->view;
@@ -407,7 +420,8 @@ static double round_length(double length)
 }
 
 /* The corner of the picture where a rectangle covers least of the map; the eye counts for a lot. */
-static void choose_corner(const map *p, const bitmap *im, int wide, int tall, int margin, int *x, int *y)
+static void choose_corner(const map *p, const bitmap *im, int wide, int tall, int margin, int *x,
+                          int *y)
 {
     double least = INFINITY, eye[3];
     place(p, p->view->eye, eye);
@@ -418,7 +432,8 @@ static void choose_corner(const map *p, const bitmap *im, int wide, int tall, in
         double covered = ex > -9 && ey > -9 && ex < wide + 9 && ey < tall + 9 ? 1e9 : 0;
         for (int v = top < 0 ? 0 : top; v < top + tall && v < (int)im->height; ++v) {
             for (int u = left < 0 ? 0 : left; u < left + wide && u < (int)im->width; ++u) {
-                covered += p->pixels[(size_t)v * FINE * p->width + (size_t)u * FINE].object != MODEL_NONE;
+                covered += p->pixels[(size_t)v * FINE * p->width + (size_t)u * FINE].object !=
+                           MODEL_NONE;
             }
         }
         if (covered < least) {
@@ -437,7 +452,8 @@ static void draw_legend(const map *p, bitmap *im, const uint8_t *states)
     }
     int s = im->width >= 800 ? 2 : 1, line = bitmap_text_height(s) + 2 * s, pad = 6 * s, wide = 0;
     char text[4][64];
-    double bar = round_length(im->width * 0.18 * FINE / p->scale), bar_pixels = bar * p->scale / FINE;
+    double bar = round_length(im->width * 0.18 * FINE / p->scale),
+           bar_pixels = bar * p->scale / FINE;
     for (int k = 0; k < 3; ++k) {
         snprintf(text[k], sizeof text[k], "%u %s", counts[2 - k], state_names[2 - k]);
     }

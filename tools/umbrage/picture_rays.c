@@ -16,15 +16,16 @@ picture_hit picture_rays_one(truth *t, const umb_view *view, double x, double y)
     return hit;
 }
 
-bool picture_rays_trace(picture_rays *r, truth *t, const umb_view *view, uint32_t width, uint32_t height)
+bool picture_rays_trace(picture_rays *r, truth *t, const umb_view *view, uint32_t width,
+                        uint32_t height)
 {
     r->hits = malloc((size_t)width * height * sizeof *r->hits);
     r->width = width;
     r->height = height;
     for (uint32_t y = 0; r->hits && y < height; ++y) {
         for (uint32_t x = 0; x < width; ++x) {
-            r->hits[(size_t)y * width + x] =
-                picture_rays_one(t, view, (x + 0.5) / width, (y + 0.5) / height);
+            r->hits[(size_t)y * width + x] = picture_rays_one(t, view, (x + 0.5) / width,
+                                                              (y + 0.5) / height);
         }
     }
     return r->hits != NULL;

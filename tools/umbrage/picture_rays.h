@@ -15,7 +15,8 @@ typedef struct picture_rays {
     uint32_t width, height;
 } picture_rays;
 
-bool picture_rays_trace(picture_rays *r, truth *t, const umb_view *view, uint32_t width, uint32_t height);
+bool picture_rays_trace(picture_rays *r, truth *t, const umb_view *view, uint32_t width,
+                        uint32_t height);
 void picture_rays_free(picture_rays *r);
 /* One ray, x and y in [0, 1]. */
 picture_hit picture_rays_one(truth *t, const umb_view *view, double x, double y);
