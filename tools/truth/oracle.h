@@ -42,6 +42,15 @@ struct truth {
     oracle_box_node *box_nodes;
 };
 
+typedef enum oracle_form {
+    ORACLE_EITHER = 0, /* flat where it fits */
+    ORACLE_FLAT = 1,
+    ORACLE_INSTANCED = 2
+} oracle_form;
+
+/* truth_create with the form of the traced scene chosen: answers are to be the same. */
+truth *oracle_create(const model *m, oracle_form form, umb_error *error);
+
 /* World corners of a triangle, counter-clockwise seen from its front. */
 void oracle_triangle(const truth *t, uint32_t object, uint32_t triangle, float v[3][3]);
 uint8_t oracle_flags(const truth *t, uint32_t object, uint32_t triangle);

@@ -264,7 +264,7 @@ static bool build_instances(truth *t)
     return commit(t, t->scene);
 }
 
-static bool prepare(truth *t)
+static bool prepare(truth *t, oracle_form form)
 {
     const model *m = t->model;
     t->mirrored = room(m->object_count, sizeof(bool));
@@ -284,7 +284,8 @@ static bool prepare(truth *t)
         }
     }
     t->first_triangle[m->object_count] = triangles;
-    t->flat = triangles <= FLAT_TRIANGLES && vertices <= 3u * FLAT_TRIANGLES;
+    t->flat = form == ORACLE_FLAT || (form == ORACLE_EITHER && triangles <= FLAT_TRIANGLES &&
+                                      vertices <= 3u * FLAT_TRIANGLES);
     /* One thread builds: a tree that depends on timing would make ties between equal depths do so. */
     t->device = rtcNewDevice("threads=1");
     t->scene = t->device ? rtcNewScene(t->device) : NULL;
@@ -293,11 +294,16 @@ static bool prepare(truth *t)
 
 truth *truth_create(const model *m, umb_error *error)
 {
+    return oracle_create(m, ORACLE_EITHER, error);
+}
+
+truth *oracle_create(const model *m, oracle_form form, umb_error *error)
+{
     truth *t = calloc(1, sizeof(*t));
     if (t) {
         t->model = m;
     }
-    if (t && prepare(t) && oracle_boxes_build(t) && (t->flat ? build_flat(t) : build_instances(t))) {
+    if (t && prepare(t, form) && oracle_boxes_build(t) && (t->flat ? build_flat(t) : build_instances(t))) {
         return t;
     }
     if (error) {
