@@ -144,6 +144,19 @@ static void zero_area_is_exact(void **state)
             p[1][k] = base + step;
             p[2][k] = base + step * (round % 7 - 3);
         }
+        if (round % 2 == 0) {
+            /* A line through the origin, points near and far on it: here doubles round. */
+            int64_t direction[3];
+            for (int k = 0; k < 3; ++k) {
+                direction[k] = (int64_t)random_below(&random, 1024) - 512;
+            }
+            for (int i = 0; i < 3; ++i) {
+                int64_t scale = (int64_t)(1 + random_below(&random, 1023)) << random_below(&random, 40);
+                for (int k = 0; k < 3; ++k) {
+                    p[i][k] = direction[k] * scale;
+                }
+            }
+        }
         if (round % 3 == 0) {
             p[2][random_below(&random, 3)] += (int64_t)random_below(&random, 3) - 1;
         }
