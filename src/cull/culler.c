@@ -4,11 +4,12 @@
  *     pop the nearest waiting entry; hidden by what was drawn since it was tested: drop it
  *       node:     eight boxes at once against the frustum, then the raster; push what is left
  *       occluder: draw it
- *       object:   test the parts of its shape; report it; draw the occluder that it owns
+ *       object:   test the parts of its shape; draw the occluder that it owns; let it wait until what
+ *                 may be seen of it is settled; report it
  *
- * Best-first, not depth-first: an occluder that can hide a box has the smaller key, so it is already in
- * the buffer when the box is tested. Keys of children are never smaller than their parent's, so objects
- * come out front to back.
+ * Best-first, not depth-first: an occluder that can hide the nearest point of a box has the smaller key, so
+ * it is already in the buffer when the box's turn comes; and when an object is settled, all that can hide
+ * any of it are.
  */
 #include "culler.h"
 
@@ -17,6 +18,8 @@
 #include "base/memory.h"
 #include "frustum/box_kernels.h"
 #include "frustum/frustum.h"
+#include "geometry/transform.h"
+#include "found.h"
 #include "heap.h"
 #include "index/tree.h"
 #include "occlusion/image.h"
@@ -30,10 +33,11 @@ struct umb_culler {
     const umb_method_ops *ops; /* NULL: no occlusion */
     void *method;
     umb_heap heap;
+    umb_found *found; /* as they are reported */
     uint32_t *objects;
     uint8_t *inside;
     uint8_t *planes; /* per node: the plane that all its boxes failed last time (plane coherency) */
-    size_t object_capacity, inside_capacity, plane_capacity;
+    size_t found_capacity, object_capacity, inside_capacity, plane_capacity;
     uint32_t count;
     bool answered;
     umb_view view; /* of the last answer */
@@ -94,6 +98,7 @@ void umb_culler_destroy(umb_culler *c)
         c->ops->destroy(c->method);
     }
     umb_memory_free(&a, c->heap.items, c->heap.capacity * sizeof *c->heap.items);
+    umb_memory_free(&a, c->found, c->found_capacity * sizeof *c->found);
     umb_memory_free(&a, c->objects, c->object_capacity * sizeof *c->objects);
     umb_memory_free(&a, c->inside, c->inside_capacity);
     umb_memory_free(&a, c->planes, c->plane_capacity);
@@ -107,13 +112,17 @@ static bool reserve(umb_culler *c, const umb_tree *tree, const umb_committed *sc
     size_t planes = c->plane_capacity;
     if (!umb_memory_reserve(a, (void **)&c->heap.items, &c->heap.capacity,
                             (size_t)tree->item_count + tree->node_count, sizeof *c->heap.items) ||
+        !umb_memory_reserve(a, (void **)&c->found, &c->found_capacity, scene->object_count,
+                            sizeof *c->found) ||
         !umb_memory_reserve(a, (void **)&c->objects, &c->object_capacity, scene->object_count,
                             sizeof *c->objects) ||
         !umb_memory_reserve(a, (void **)&c->inside, &c->inside_capacity, scene->object_count, 1) ||
         !umb_memory_reserve(a, (void **)&c->planes, &c->plane_capacity, tree->node_count, 1)) {
         return false;
     }
-    memset(c->planes + planes, 0, c->plane_capacity - planes);
+    if (c->plane_capacity > planes) { /* an empty index has no planes at all */
+        memset(c->planes + planes, 0, c->plane_capacity - planes);
+    }
     return true;
 }
 
@@ -152,7 +161,8 @@ static bool too_small(walk *w, uint32_t ref, const umb_image_bounds *b)
 static void consider(walk *w, const umb_node *node, const umb_projected *p, uint32_t slot, uint16_t planes)
 {
     umb_waiting item = {0};
-    item.key = p->w_min[slot];
+    item.key = item.nearest = p->w_min[slot];
+    item.settled = p->w_max[slot] < w->map.far_depth ? p->w_max[slot] : w->map.far_depth;
     item.ref = node->ref[slot];
     item.planes = planes;
     item.stamp = w->drawn;
@@ -160,7 +170,7 @@ static void consider(walk *w, const umb_node *node, const umb_projected *p, uint
     w->stats.in_frustum += (item.ref & UMB_REF_KIND) == UMB_REF_OBJECT;
     if (item.testable) {
         umb_image_bounds b = {p->x_min[slot], p->y_min[slot], p->x_max[slot], p->y_max[slot],
-                              p->w_min[slot]};
+                              p->w_min[slot], p->w_max[slot]};
         if (too_small(w, item.ref, &b)) {
             return;
         }
@@ -204,62 +214,105 @@ static void draw(walk *w, uint32_t occluder)
     }
 }
 
+/* Leaves of at most this many triangles are looked at triangle by triangle; larger ones are solids, whose
+ * box says as much. */
+#define LEAF_TRIANGLES 4u
+
 /* True if the parts of the shape say more than the object's box. */
 static bool refinable(const walk *w, const umb_object *o)
 {
-    return o->refine && w->culler->ops != NULL && (o->mesh->part_count > 1 || !o->identity);
+    return o->refine && w->culler->ops != NULL &&
+           (o->mesh->part_count > 1 || !o->identity || o->mesh->seen_count <= LEAF_TRIANGLES);
 }
 
-/* Walk the parts: the nearest depth of those that are not hidden, INFINITY if all are. A part that
- * crosses the near depth ends it: nothing is nearer. */
-static double nearest_part(walk *w, const umb_object *o, uint32_t ref)
+/* True if a triangle of a leaf may be seen; *settled becomes the greatest view depth in view of the first
+ * that may. */
+static bool triangles_show(walk *w, const umb_object *o, uint32_t ref, const umb_part *part, double *settled)
+{
+    for (uint32_t i = part->begin; i < part->end; ++i) {
+        const uint32_t *corner = o->mesh->triangles[o->mesh->part_order[i]];
+        float world[3][3];
+        for (int k = 0; k < 3; ++k) {
+            const float *p = o->mesh->positions[corner[k]];
+            if (o->identity) {
+                memcpy(world[k], p, sizeof world[k]);
+            } else {
+                umb_transform_point(&o->transform, p, world[k]);
+            }
+        }
+        umb_image_bounds b;
+        umb_depth_place place = umb_image_of_triangle(&w->map, (const float(*)[3])world, &b);
+        if (place == UMB_DEPTH_OUTSIDE) {
+            continue;
+        }
+        *settled = place == UMB_DEPTH_BEYOND ? b.w_max : -INFINITY;
+        umb_image image = umb_image_of_bounds(&w->map, &b);
+        if (place == UMB_DEPTH_CROSSING || !hidden(w, ref, &image)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Walk the parts from item->part on to the first that may be seen, and stay there: parts passed over are
+ * hidden and remain so. False if all are. */
+static bool parts_show(walk *w, const umb_object *o, umb_waiting *item)
 {
     const umb_mesh *mesh = o->mesh;
-    double nearest = INFINITY;
-    for (uint32_t i = 0; i < mesh->part_count;) {
-        const umb_part *part = &mesh->parts[i];
-        bool leaf = part->skip == i + 1;
+    while (item->part < mesh->part_count) {
+        const umb_part *part = &mesh->parts[item->part];
+        bool leaf = part->skip == item->part + 1;
+        bool small = leaf && part->end - part->begin <= LEAF_TRIANGLES;
         umb_image_bounds b;
         umb_depth_place place = umb_image_of_part(&w->map, &part->box, &o->transform, o->identity, &b);
-        if (place == UMB_DEPTH_CROSSING && leaf) {
-            return -INFINITY;
-        }
         bool over = place == UMB_DEPTH_OUTSIDE;
         if (place == UMB_DEPTH_BEYOND) {
             umb_image image = umb_image_of_bounds(&w->map, &b);
-            over = b.w_min >= nearest || hidden(w, ref, &image);
-            nearest = leaf && !over ? b.w_min : nearest;
+            over = hidden(w, item->ref, &image);
+            item->settled = b.w_max;
         }
-        i = over ? part->skip : i + 1;
+        if (!over && leaf && (small || place == UMB_DEPTH_CROSSING)) {
+            over = !triangles_show(w, o, item->ref, part, &item->settled);
+        }
+        if (!over && leaf) {
+            return true;
+        }
+        item->part = over ? part->skip : item->part + 1;
     }
-    return nearest;
+    return false;
 }
 
-/* An object whose turn has come. Its box may be much nearer than anything in it: then it waits again, for
- * the turn of its nearest part, while what lies between is drawn. */
-static void visit_object(walk *w, umb_waiting *item)
+static void report(walk *w, const umb_waiting *item)
 {
     umb_culler *c = w->culler;
-    uint32_t id = item->ref & UMB_REF_NUMBER;
-    const umb_object *o = &w->scene->objects[id];
-    if (refinable(w, o) && !(item->refined && item->stamp == w->drawn)) {
-        double nearest = nearest_part(w, o, item->ref);
-        if (nearest == INFINITY) {
-            w->stats.hidden_objects += 1;
-            return;
-        }
-        if (nearest > item->key) {
-            item->key = nearest;
-            item->stamp = w->drawn;
-            item->refined = true;
-            umb_heap_push(&c->heap, item);
-            return;
-        }
+    umb_found *f = &c->found[c->count++];
+    f->key = item->nearest;
+    f->id = item->ref & UMB_REF_NUMBER;
+    f->inside = item->planes == 0;
+}
+
+/* An object whose turn has come. If something of it may be seen it becomes an occluder at once, but it is
+ * reported only when everything nearer than the far end of what may be seen has been drawn: until then it
+ * waits again, and may yet turn out to be hidden. */
+static void visit_object(walk *w, umb_waiting *item)
+{
+    const umb_object *o = &w->scene->objects[item->ref & UMB_REF_NUMBER];
+    bool fresh = !(item->drawn && item->stamp == w->drawn);
+    if (fresh && refinable(w, o) && !parts_show(w, o, item)) {
+        w->stats.hidden_objects += 1;
+        return;
     }
-    c->objects[c->count] = id;
-    c->inside[c->count] = item->planes == 0;
-    c->count += 1;
-    draw(w, o->occluder);
+    if (!item->drawn) {
+        draw(w, o->occluder);
+        item->drawn = true;
+    }
+    if (w->culler->ops == NULL || !(item->settled > item->key)) {
+        report(w, item);
+        return;
+    }
+    item->key = item->settled;
+    item->stamp = w->drawn;
+    umb_heap_push(&w->culler->heap, item);
 }
 
 static void run(walk *w)
@@ -330,6 +383,11 @@ umb_result umb_cull(umb_culler *c, const umb_view *view, umb_visible_set *out)
     }
     c->heap.count = 0;
     run(&w);
+    umb_found_sort(c->found, c->count);
+    for (uint32_t i = 0; i < c->count; ++i) {
+        c->objects[i] = c->found[i].id;
+        c->inside[i] = c->found[i].inside;
+    }
     w.stats.visible = c->count;
     c->view = *view;
     c->answered = true;

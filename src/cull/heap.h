@@ -7,13 +7,16 @@
 #include "occlusion/method.h"
 
 typedef struct umb_waiting {
-    double key;      /* nearest view depth */
+    double key;      /* the view depth at which its turn comes */
+    double nearest;  /* least view depth of its box: the key at first */
+    double settled;  /* objects: the view depth beyond which nothing drawn can hide what keeps it visible */
     uint32_t ref;    /* index/tree.h */
     uint32_t stamp;  /* how many occluders had been drawn when it was last tested */
     umb_image image; /* meaningful if testable */
+    uint32_t part;   /* objects: parts before this one are hidden */
     uint16_t planes; /* frustum planes that its box may cross */
     bool testable;   /* beyond the near depth everywhere */
-    bool refined;    /* an object whose key is that of its nearest part not hidden at stamp */
+    bool drawn;      /* objects: seen once, its occluder is in the buffer; waits until it is settled */
 } umb_waiting;
 
 typedef struct umb_heap {

@@ -164,12 +164,94 @@ static umb_result update(void *user)
     return UMB_OK;
 }
 
+/* ---- restoring ------------------------------------------------------------------------------ */
+
+/* What is known of stored nodes while they are read. */
+typedef struct restorer {
+    const umb_committed *scene;
+    umb_node *nodes;
+    uint8_t *seen; /* nodes, then objects, then occluders: named by some slot before */
+    uint32_t node_count, item_count;
+    bool flat;
+} restorer;
+
+/* The place of a slot's item or node in the list of what has been seen; UMB_NONE when it cannot be. A node
+ * comes after the one that names it, so that no walk can run in circles. */
+static uint32_t place_of(const restorer *r, uint32_t node, uint32_t ref)
+{
+    uint32_t number = ref & UMB_REF_NUMBER;
+    switch (ref & UMB_REF_KIND) {
+    case UMB_REF_NODE:
+        return !r->flat && number > node && number < r->node_count ? number : UMB_NONE;
+    case UMB_REF_OBJECT:
+        return number < r->scene->object_count && r->scene->objects[number].live ? r->node_count + number
+                                                                                  : UMB_NONE;
+    case UMB_REF_OCCLUDER:
+        return number >= r->scene->first_free_occluder && number < r->scene->occluder_count
+                   ? r->node_count + r->scene->object_count + number
+                   : UMB_NONE;
+    default:
+        return UMB_NONE;
+    }
+}
+
+static bool restore_node(restorer *r, uint32_t k, const uint32_t refs[UMB_NODE_WIDTH])
+{
+    umb_node *node = &r->nodes[k];
+    while (node->count < UMB_NODE_WIDTH && refs[node->count] != UMB_NONE) {
+        uint32_t ref = refs[node->count], place = place_of(r, k, ref);
+        if (place == UMB_NONE || r->seen[place]) {
+            return false;
+        }
+        r->seen[place] = 1;
+        if ((ref & UMB_REF_KIND) == UMB_REF_NODE) {
+            r->nodes[ref].parent = k;
+        } else {
+            r->item_count += 1;
+        }
+        node->ref[node->count++] = ref;
+    }
+    for (uint32_t i = node->count; i < UMB_NODE_WIDTH; ++i) {
+        if (refs[i] != UMB_NONE) {
+            return false;
+        }
+    }
+    return node->count > 0 && (r->flat || k == 0 || r->seen[k]);
+}
+
+static umb_result restore_nodes(umb_index *index, const uint32_t (*refs)[UMB_NODE_WIDTH], uint32_t node_count)
+{
+    const umb_allocator *a = &index->allocator;
+    const umb_committed *c = umb_scene_committed(index->scene);
+    restorer r = {.scene = c, .node_count = node_count, .flat = index->tree.flat};
+    size_t places = (size_t)node_count + c->object_count + c->occluder_count;
+    r.nodes = umb_memory_allocate_zero(a, node_count, sizeof(umb_node));
+    r.seen = umb_memory_allocate_zero(a, places, 1);
+    umb_result result = r.nodes != NULL && r.seen != NULL ? UMB_OK : UMB_ERROR_MEMORY;
+    for (uint32_t k = 0; k < node_count && result == UMB_OK; ++k) {
+        r.nodes[k].parent = UMB_NONE;
+    }
+    for (uint32_t k = 0; k < node_count && result == UMB_OK; ++k) {
+        result = restore_node(&r, k, refs[k]) ? UMB_OK : UMB_ERROR_FORMAT;
+    }
+    if (result == UMB_OK && r.item_count != count_items(c)) {
+        result = UMB_ERROR_FORMAT;
+    }
+    umb_memory_free(a, r.seen, places);
+    if (result != UMB_OK) {
+        umb_memory_free(a, r.nodes, node_count * sizeof(umb_node));
+        return umb_scene_fail(index->scene, result, "stored nodes make no index");
+    }
+    umb_bvh_refit(r.nodes, node_count, c);
+    adopt(index, c, r.nodes, node_count, r.item_count);
+    return UMB_OK;
+}
+
 /* ---- public --------------------------------------------------------------------------------- */
 
-umb_result umb_index_create(umb_scene *scene, const umb_index_def *def, umb_index **out)
+/* An index that holds nothing yet and follows nothing. */
+static umb_result make_empty(umb_scene *scene, const umb_index_def *def, umb_index **out)
 {
-    static const umb_index_def defaults = {0};
-    def = def != NULL ? def : &defaults;
     *out = NULL;
     if (def->kind != UMB_INDEX_BVH && def->kind != UMB_INDEX_FLAT) {
         return umb_scene_fail(scene, UMB_ERROR_ARGUMENT, "no index kind %d", (int)def->kind);
@@ -179,24 +261,54 @@ umb_result umb_index_create(umb_scene *scene, const umb_index_def *def, umb_inde
     if (index == NULL) {
         return umb_scene_fail(scene, UMB_ERROR_MEMORY, "no memory for an index");
     }
-    const umb_committed *c = umb_scene_committed(scene);
     index->scene = scene;
     index->allocator = *a;
     index->tasks = def->tasks;
     index->kind = def->kind;
     index->tree.flat = def->kind == UMB_INDEX_FLAT;
-    umb_result result = rebuild(index, c);
+    *out = index;
+    return UMB_OK;
+}
+
+/* Its nodes are there: follow the scene from now on. Takes the index, and frees it after a failure. */
+static umb_result start_following(umb_index *index, umb_result result, umb_index **out)
+{
     if (result != UMB_OK) {
-        umb_memory_free(a, index, sizeof(*index));
+        umb_allocator a = index->allocator;
+        umb_memory_free(&a, index, sizeof(*index));
         return result;
     }
     index->tree.bounds = bounds_of(index->nodes, index->tree.node_count, index->tree.flat);
-    index->tree.version = c->version;
+    index->tree.version = umb_scene_committed(index->scene)->version;
     index->listener.update = update;
     index->listener.user = index;
-    umb_scene_listen(scene, &index->listener);
+    umb_scene_listen(index->scene, &index->listener);
     *out = index;
     return UMB_OK;
+}
+
+umb_result umb_index_create(umb_scene *scene, const umb_index_def *def, umb_index **out)
+{
+    static const umb_index_def defaults = {0};
+    *out = NULL;
+    umb_index *index = NULL;
+    umb_result result = make_empty(scene, def != NULL ? def : &defaults, &index);
+    if (result != UMB_OK) {
+        return result;
+    }
+    return start_following(index, rebuild(index, umb_scene_committed(scene)), out);
+}
+
+umb_result umb_index_restore(umb_scene *scene, const umb_index_def *def,
+                             const uint32_t (*refs)[UMB_NODE_WIDTH], uint32_t node_count, umb_index **out)
+{
+    *out = NULL;
+    umb_index *index = NULL;
+    umb_result result = make_empty(scene, def, &index);
+    if (result != UMB_OK) {
+        return result;
+    }
+    return start_following(index, restore_nodes(index, refs, node_count), out);
 }
 
 void umb_index_destroy(umb_index *index)

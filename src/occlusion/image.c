@@ -55,20 +55,63 @@ static double place_corners(const umb_raster_map *map, const umb_aabb *part, con
     return slop;
 }
 
+/* The view's six sides as g(X, Y, W) >= 0 inside: depth, then the raster's borders. */
+enum { SIDES = 6 };
+
+static double side_value(const umb_raster_map *m, int side, const umb_view_point *v)
+{
+    double one = m->orthographic ? 1.0 : v->w;
+    switch (side) {
+    case 0:
+        return v->w - m->near_depth;
+    case 1:
+        return m->far_depth - v->w;
+    case 2:
+        return v->x + m->cx * one;
+    case 3:
+        return (m->width - m->cx) * one - v->x;
+    case 4:
+        return v->y + m->cy * one;
+    default:
+        return (m->height - m->cy) * one - v->y;
+    }
+}
+
+/* How far outside a computed point may lie when the true one does not: 64 units of what its error is
+ * relative to. */
+static double side_slack(const umb_raster_map *m, int side, double reach)
+{
+    if (side < 2) {
+        return 64.0 * UMB_U * (reach + fabs(m->near_depth) + (side == 1 ? m->far_depth : 0.0));
+    }
+    double across = fabs(m->cx) + fabs(m->cy) + m->width + m->height;
+    return 64.0 * UMB_U * (m->scale * reach + across * (m->orthographic ? 1.0 : reach));
+}
+
 umb_depth_place umb_image_of_part(const umb_raster_map *map, const umb_aabb *part,
                                   const umb_transform *transform, bool identity, umb_image_bounds *out)
 {
     umb_view_point corner[8];
     double slop = place_corners(map, part, transform, identity, corner);
-    double w_max = -INFINITY;
+    double reach = 0.0;
     out->w_min = INFINITY;
+    out->w_max = -INFINITY;
     for (int k = 0; k < 8; ++k) {
         double error = 8.0 * UMB_U * corner[k].reach + 3.0 * slop;
         out->w_min = corner[k].w - error < out->w_min ? corner[k].w - error : out->w_min;
-        w_max = corner[k].w + error > w_max ? corner[k].w + error : w_max;
+        out->w_max = corner[k].w + error > out->w_max ? corner[k].w + error : out->w_max;
+        reach = corner[k].reach > reach ? corner[k].reach : reach;
     }
-    if (w_max < map->near_depth || out->w_min > map->far_depth) {
-        return UMB_DEPTH_OUTSIDE;
+    for (int side = 0; side < SIDES; ++side) {
+        double across = side < 2 ? 1.0 : map->scale + fabs(map->cx) + fabs(map->cy) + map->width + map->height;
+        double most = -INFINITY;
+        for (int k = 0; k < 8; ++k) {
+            double g = side_value(map, side, &corner[k]);
+            most = g > most ? g : most;
+        }
+        if (most < -(side_slack(map, side, reach) + 3.0 * slop * across)) {
+            return UMB_DEPTH_OUTSIDE;
+        }
     }
     if (!(out->w_min >= map->near_depth)) {
         return UMB_DEPTH_CROSSING;
@@ -83,6 +126,67 @@ umb_depth_place umb_image_of_part(const umb_raster_map *map, const umb_aabb *par
         out->y_min = p.y - error < out->y_min ? p.y - error : out->y_min;
         out->x_max = p.x + error > out->x_max ? p.x + error : out->x_max;
         out->y_max = p.y + error > out->y_max ? p.y + error : out->y_max;
+    }
+    return UMB_DEPTH_BEYOND;
+}
+
+/* Cut a convex polygon at one side, moved outwards by slack. Returns the number of corners left. */
+static int cut_polygon(const umb_raster_map *map, int side, double slack, const umb_view_point *in,
+                       int count, umb_view_point *out)
+{
+    int kept = 0;
+    for (int i = 0; i < count; ++i) {
+        const umb_view_point *p = &in[i], *q = &in[(i + 1) % count];
+        double gp = side_value(map, side, p) + slack, gq = side_value(map, side, q) + slack;
+        if (gp >= 0.0) {
+            out[kept++] = *p;
+        }
+        if ((gp >= 0.0) != (gq >= 0.0)) {
+            double t = gp / (gp - gq);
+            umb_view_point cut = {p->x + t * (q->x - p->x), p->y + t * (q->y - p->y),
+                                  p->w + t * (q->w - p->w), p->reach};
+            out[kept++] = cut;
+        }
+    }
+    return kept;
+}
+
+umb_depth_place umb_image_of_triangle(const umb_raster_map *map, const float corner[3][3],
+                                      umb_image_bounds *out)
+{
+    umb_view_point polygon[2][3 + SIDES];
+    double reach = 0.0;
+    for (int i = 0; i < 3; ++i) {
+        polygon[0][i] = umb_raster_map_point(map, corner[i]);
+        reach = polygon[0][i].reach > reach ? polygon[0][i].reach : reach;
+    }
+    int count = 3, now = 0;
+    for (int side = 0; side < SIDES && count > 0; ++side) {
+        if (side == 1 && isinf(map->far_depth)) {
+            continue;
+        }
+        count = cut_polygon(map, side, side_slack(map, side, reach), polygon[now], count, polygon[1 - now]);
+        now = 1 - now;
+    }
+    if (count == 0) {
+        return UMB_DEPTH_OUTSIDE;
+    }
+    out->w_min = out->x_min = out->y_min = INFINITY;
+    out->w_max = out->x_max = out->y_max = -INFINITY;
+    for (int i = 0; i < count; ++i) {
+        umb_view_point v = polygon[now][i];
+        double error = 64.0 * UMB_U * reach;
+        if (!map->orthographic && !(v.w > 2.0 * error)) {
+            return UMB_DEPTH_CROSSING;
+        }
+        v.reach = reach;
+        umb_raster_point p = umb_raster_map_project(map, v, 64.0);
+        out->w_min = v.w - error < out->w_min ? v.w - error : out->w_min;
+        out->w_max = v.w + error > out->w_max ? v.w + error : out->w_max;
+        out->x_min = p.x - p.error < out->x_min ? p.x - p.error : out->x_min;
+        out->y_min = p.y - p.error < out->y_min ? p.y - p.error : out->y_min;
+        out->x_max = p.x + p.error > out->x_max ? p.x + p.error : out->x_max;
+        out->y_max = p.y + p.error > out->y_max ? p.y + p.error : out->y_max;
     }
     return UMB_DEPTH_BEYOND;
 }

@@ -7,7 +7,7 @@
 /* Bounds of an image in raster coordinates and of its depth; outer, errors included. */
 typedef struct umb_image_bounds {
     double x_min, y_min, x_max, y_max;
-    double w_min;
+    double w_min, w_max;
 } umb_image_bounds;
 
 /* Pixels whose closed squares cover those bounds as far as they are on the raster. A point on a pixel's
@@ -24,5 +24,10 @@ typedef enum umb_depth_place {
  * one rounding to float; identity: by none. */
 umb_depth_place umb_image_of_part(const umb_raster_map *map, const umb_aabb *part,
                                   const umb_transform *transform, bool identity, umb_image_bounds *out);
+
+/* Image of what the view can see of a triangle of world vertices: it is cut at the near and far depths and
+ * at the raster's borders first. CROSSING only where rounding leaves no image. */
+umb_depth_place umb_image_of_triangle(const umb_raster_map *map, const float corner[3][3],
+                                      umb_image_bounds *out);
 
 #endif

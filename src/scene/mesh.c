@@ -172,10 +172,11 @@ umb_mesh *umb_mesh_allocate(const umb_allocator *allocator, const umb_mesh *size
 {
     size_t positions = round_up(sizeof(umb_mesh));
     size_t triangles = positions + round_up(sizes->position_count * sizeof *sizes->positions);
-    size_t two_sided = triangles + round_up(sizes->triangle_count * sizeof *sizes->triangles);
+    size_t two_sided = triangles + round_up(sizes->seen_count * sizeof *sizes->triangles);
     size_t edges = two_sided + round_up(sizes->triangle_count * sizeof *sizes->two_sided);
     size_t parts = edges + round_up(sizes->edge_count * sizeof *sizes->edges);
-    size_t bytes = parts + round_up(sizes->part_count * sizeof *sizes->parts);
+    size_t order = parts + round_up(sizes->part_count * sizeof *sizes->parts);
+    size_t bytes = order + round_up(sizes->seen_count * sizeof *sizes->part_order);
     char *block = umb_memory_allocate(allocator, bytes);
     if (block == NULL) {
         return NULL;
@@ -187,18 +188,21 @@ umb_mesh *umb_mesh_allocate(const umb_allocator *allocator, const umb_mesh *size
     m->two_sided = (uint8_t *)(block + two_sided);
     m->edges = (umb_edge *)(void *)(block + edges);
     m->parts = (umb_part *)(void *)(block + parts);
+    m->part_order = (uint32_t *)(void *)(block + order);
     m->bytes = bytes;
     return m;
 }
 
 /* Copy what was built into one block. */
 static umb_mesh *pack(const umb_allocator *allocator, const mesh_builder *b, const umb_edge *edges,
-                      uint32_t edge_count, const umb_part *parts, uint32_t part_count)
+                      uint32_t edge_count, const umb_part *parts, uint32_t part_count,
+                      const uint32_t *part_order)
 {
     umb_mesh sizes = {0};
     sizes.position_count = b->position_count;
     sizes.block_position_count = b->block_position_count;
     sizes.triangle_count = b->blocking_count;
+    sizes.seen_count = b->triangle_count;
     sizes.edge_count = edge_count;
     sizes.part_count = part_count;
     umb_mesh *m = umb_mesh_allocate(allocator, &sizes);
@@ -206,10 +210,13 @@ static umb_mesh *pack(const umb_allocator *allocator, const mesh_builder *b, con
         return NULL;
     }
     memcpy(m->positions, b->positions, b->position_count * sizeof *m->positions);
-    memcpy(m->triangles, b->triangles, b->blocking_count * sizeof *m->triangles);
+    memcpy(m->triangles, b->triangles, b->triangle_count * sizeof *m->triangles);
     memcpy(m->two_sided, b->two_sided, b->blocking_count * sizeof *m->two_sided);
     memcpy(m->edges, edges, edge_count * sizeof *m->edges);
     memcpy(m->parts, parts, part_count * sizeof *m->parts);
+    if (b->triangle_count > 0) {
+        memcpy(m->part_order, part_order, b->triangle_count * sizeof *m->part_order);
+    }
     for (uint32_t t = 0; t < m->triangle_count; ++t) {
         m->any_two_sided |= m->two_sided[t];
     }
@@ -239,14 +246,15 @@ umb_result umb_mesh_create(const umb_allocator *allocator, const umb_shape_def *
         const uint32_t(*triangles)[3] = (const uint32_t(*)[3])b.triangles;
         umb_edge *edges =
             umb_mesh_edges_build(&scratch, triangles, b.two_sided, b.blocking_count, &edge_count);
-        umb_part whole = {bounds_of((const float(*)[3])b.positions, b.position_count), 1};
+        umb_part whole = {bounds_of((const float(*)[3])b.positions, b.position_count), 1, 0, 0};
         const umb_part *parts = &whole;
+        const uint32_t *part_order = NULL;
         if (b.triangle_count > 0) {
             parts = umb_mesh_parts_build(&scratch, (const float(*)[3])b.positions, triangles,
-                                         b.triangle_count, &part_count);
+                                         b.triangle_count, &part_count, &part_order);
         }
         if (!scratch.failed) {
-            *out = pack(allocator, &b, edges, edge_count, parts, part_count);
+            *out = pack(allocator, &b, edges, edge_count, parts, part_count, part_order);
         }
     }
     umb_scratch_free(&scratch);

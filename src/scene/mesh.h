@@ -21,15 +21,19 @@ typedef struct umb_edge {
 typedef struct umb_part {
     umb_aabb box;
     uint32_t skip; /* own number + 1: a leaf */
+    uint32_t begin, end; /* its triangles: those that part_order[begin .. end) names */
 } umb_part;
 
 typedef struct umb_mesh {
     float (*positions)[3];
-    uint32_t (*triangles)[3]; /* blocking triangles only: not OPEN, not of zero area in exact arithmetic */
+    uint32_t (*triangles)[3]; /* the blocking ones first: not OPEN, not of zero area in exact arithmetic */
     uint8_t *two_sided;       /* per blocking triangle: 1 or 0 */
     umb_edge *edges;
     umb_part *parts; /* hold every triangle, OPEN and degenerate ones too */
-    uint32_t position_count, triangle_count, edge_count, part_count;
+    uint32_t *part_order;     /* every triangle once, by parts */
+    uint32_t position_count, edge_count, part_count;
+    uint32_t triangle_count;  /* blocking triangles */
+    uint32_t seen_count;      /* all triangles */
     uint32_t block_position_count; /* blocking triangles use positions below this; the rest is only seen */
     uint32_t any_two_sided;
     umb_aabb bounds;          /* of all positions that a triangle uses */

@@ -349,6 +349,11 @@ uint32_t umb_scene_object_count(const umb_scene *scene)
     return scene->object_ids.used;
 }
 
+const double *umb_scene_origin(const umb_scene *scene)
+{
+    return scene->origin;
+}
+
 const umb_allocator *umb_scene_allocator(const umb_scene *scene)
 {
     return &scene->allocator;

@@ -50,6 +50,8 @@ typedef struct umb_scene_listener {
 void umb_scene_listen(umb_scene *scene, umb_scene_listener *listener);
 void umb_scene_unlisten(umb_scene *scene, umb_scene_listener *listener);
 
+/* The origin that the scene was made with, three doubles. */
+const double *umb_scene_origin(const umb_scene *scene);
 const umb_allocator *umb_scene_allocator(const umb_scene *scene);
 /* Fill in the scene's umb_error (if there is one) and return code. */
 umb_result umb_scene_fail(const umb_scene *scene, umb_result code, const char *format, ...)

@@ -1,0 +1,353 @@
+/* Reading a captured frame: umb_capture_load(). Nothing in the block is believed before it is checked:
+ * a checksum keeps accidents out, not malice. */
+#include <string.h>
+
+#include "base/checksum.h"
+#include "base/scratch.h"
+#include "capture_format.h"
+#include "culler.h"
+#include "index/tree.h"
+#include "umbrage/capture.h"
+
+typedef struct loader {
+    const uint8_t *bytes;
+    uint64_t size;
+    const uint8_t *sections[UMB_CAPTURE_SECTION_COUNT];
+    uint32_t counts[UMB_CAPTURE_SECTION_COUNT];
+    const uint8_t *at;
+    double origin[3];
+    umb_shape *shapes;
+    umb_tasks tasks;
+    umb_isa isa;
+    umb_capture *out;
+    umb_error *error;
+} loader;
+
+static uint64_t get(const uint8_t *p, int bytes)
+{
+    uint64_t x = 0;
+    for (int i = bytes - 1; i >= 0; --i) {
+        x = x << 8 | p[i];
+    }
+    return x;
+}
+
+static uint32_t get_word(loader *l)
+{
+    l->at += 4;
+    return (uint32_t)get(l->at - 4, 4);
+}
+
+static float get_float(loader *l)
+{
+    uint32_t bits = get_word(l);
+    float value;
+    memcpy(&value, &bits, sizeof value);
+    return value;
+}
+
+static void get_doubles(loader *l, double *out, int count)
+{
+    for (int i = 0; i < count; ++i) {
+        uint64_t bits = get(l->at, 8);
+        memcpy(&out[i], &bits, sizeof out[i]);
+        l->at += 8;
+    }
+}
+
+static umb_result fail(const loader *l, const char *what)
+{
+    return umb_error_set(l->error, UMB_ERROR_FORMAT, "capture: %s", what);
+}
+
+/* What a call on stored data answered: a broken rule of the call is a broken file. */
+static umb_result fail_call(const loader *l, umb_result result, const char *what)
+{
+    if (result == UMB_ERROR_MEMORY) {
+        return umb_error_set(l->error, result, "capture: no memory for its %s", what);
+    }
+    return umb_error_set(l->error, UMB_ERROR_FORMAT, "capture: its %s break the rules", what);
+}
+
+static umb_result check_header(loader *l)
+{
+    if (l->bytes == NULL || l->size < UMB_CAPTURE_HEADER || memcmp(l->bytes, UMB_CAPTURE_MAGIC, 8) != 0) {
+        return fail(l, "no captured frame");
+    }
+    uint32_t version = (uint32_t)get(l->bytes + 8, 4);
+    if (version != UMB_CAPTURE_VERSION) {
+        return umb_error_set(l->error, UMB_ERROR_VERSION, "capture: version %u, this library reads %u", version,
+                             UMB_CAPTURE_VERSION);
+    }
+    if (get(l->bytes + 12, 4) != UMB_CAPTURE_HEADER || get(l->bytes + 16, 8) != l->size) {
+        return fail(l, "cut short, or not its own size");
+    }
+    if (get(l->bytes + 24, 8) !=
+        umb_checksum(l->bytes + UMB_CAPTURE_TABLE, (size_t)l->size - UMB_CAPTURE_TABLE)) {
+        return fail(l, "damaged: the checksum differs");
+    }
+    return UMB_OK;
+}
+
+/* Sections lie where the writer puts them, so their places say nothing but their counts. */
+static umb_result check_sections(loader *l)
+{
+    uint64_t end = UMB_CAPTURE_HEADER;
+    for (int k = 0; k < UMB_CAPTURE_SECTION_COUNT; ++k) {
+        const uint8_t *entry = l->bytes + UMB_CAPTURE_TABLE + 16 * (size_t)k;
+        uint64_t offset = get(entry, 8), count = get(entry + 8, 8);
+        if (offset != umb_capture_align(end) || offset > l->size ||
+            count > (l->size - offset) / umb_capture_record_bytes(k) || count > (1u << 30)) {
+            return fail(l, "a section lies outside of it");
+        }
+        l->sections[k] = l->bytes + offset;
+        l->counts[k] = (uint32_t)count;
+        end = offset + count * umb_capture_record_bytes(k);
+    }
+    if (end != l->size || l->counts[UMB_CAPTURE_FRAME] != 1 ||
+        l->counts[UMB_CAPTURE_FLAGS] != l->counts[UMB_CAPTURE_TRIANGLES]) {
+        return fail(l, "sections that do not belong together");
+    }
+    return UMB_OK;
+}
+
+static umb_result read_frame(loader *l)
+{
+    umb_view *v = &l->out->view;
+    double numbers[8];
+    uint32_t words[8];
+    l->at = l->sections[UMB_CAPTURE_FRAME];
+    get_doubles(l, l->origin, 3);
+    get_doubles(l, v->eye, 3);
+    get_doubles(l, v->right, 3);
+    get_doubles(l, v->up, 3);
+    get_doubles(l, v->forward, 3);
+    get_doubles(l, numbers, 8);
+    get_doubles(l, v->planes[0], 4 * UMB_MAX_CLIP_PLANES);
+    for (int i = 0; i < 8; ++i) {
+        words[i] = get_word(l);
+    }
+    v->x_min = numbers[0];
+    v->x_max = numbers[1];
+    v->y_min = numbers[2];
+    v->y_max = numbers[3];
+    v->near_depth = numbers[4];
+    v->far_depth = numbers[5];
+    v->min_pixels = numbers[6];
+    v->time = numbers[7];
+    if (words[0] > UMB_METHOD_NONE || words[1] > UMB_INDEX_FLAT || words[2] > UMB_ORTHOGRAPHIC) {
+        return fail(l, "unknown method, index or projection");
+    }
+    l->out->method = (umb_method)words[0];
+    l->out->kind = (umb_index_kind)words[1];
+    v->projection = (umb_projection)words[2];
+    v->width = words[3];
+    v->height = words[4];
+    v->buffer_width = words[5];
+    v->buffer_height = words[6];
+    v->plane_count = words[7];
+    return umb_view_check(v, NULL) == UMB_OK ? UMB_OK : fail(l, "an impossible view");
+}
+
+static umb_result read_meshes(loader *l, umb_scratch *scratch)
+{
+    uint32_t position_count = l->counts[UMB_CAPTURE_POSITIONS];
+    uint32_t triangle_count = l->counts[UMB_CAPTURE_TRIANGLES];
+    float *positions = umb_scratch_get(scratch, (size_t)position_count, 3 * sizeof *positions);
+    uint32_t *indices = umb_scratch_get(scratch, (size_t)triangle_count, 3 * sizeof *indices);
+    l->shapes = umb_scratch_get(scratch, l->counts[UMB_CAPTURE_MESHES], sizeof *l->shapes);
+    if (scratch->failed) {
+        return fail_call(l, UMB_ERROR_MEMORY, "meshes");
+    }
+    l->at = l->sections[UMB_CAPTURE_POSITIONS];
+    for (size_t i = 0; i < 3 * (size_t)position_count; ++i) {
+        positions[i] = get_float(l);
+    }
+    l->at = l->sections[UMB_CAPTURE_TRIANGLES];
+    for (size_t i = 0; i < 3 * (size_t)triangle_count; ++i) {
+        indices[i] = get_word(l);
+    }
+    size_t position = 0, triangle = 0;
+    l->at = l->sections[UMB_CAPTURE_MESHES];
+    for (uint32_t m = 0; m < l->counts[UMB_CAPTURE_MESHES]; ++m) {
+        uint32_t p = get_word(l), t = get_word(l);
+        if (p > position_count - position || t > triangle_count - triangle) {
+            return fail(l, "a mesh larger than what is stored");
+        }
+        umb_shape_def def = {.positions = positions + 3 * position,
+                             .position_count = p,
+                             .indices = indices + 3 * triangle,
+                             .index_count = 3 * t,
+                             .triangle_flags = l->sections[UMB_CAPTURE_FLAGS] + triangle};
+        umb_result result = umb_scene_add_shape(l->out->scene, &def, &l->shapes[m]);
+        if (result != UMB_OK) {
+            return fail_call(l, result, "meshes");
+        }
+        position += p;
+        triangle += t;
+    }
+    return position == position_count && triangle == triangle_count ? UMB_OK
+                                                                    : fail(l, "more triangles than meshes");
+}
+
+static umb_transform get_transform(loader *l)
+{
+    umb_transform t;
+    for (int i = 0; i < 12; ++i) {
+        t.m[i / 4][i % 4] = get_float(l);
+    }
+    return t;
+}
+
+static bool get_shape(loader *l, umb_shape *out)
+{
+    uint32_t m = get_word(l);
+    *out = m < l->counts[UMB_CAPTURE_MESHES] ? l->shapes[m] : 0;
+    return m == UMB_NONE || *out != 0;
+}
+
+/* An id that is free in the capture is one that was used and removed. */
+static umb_result read_object(loader *l)
+{
+    umb_object_def def = {0};
+    for (int k = 0; k < 3; ++k) {
+        def.bounds.min[k] = get_float(l);
+    }
+    for (int k = 0; k < 3; ++k) {
+        def.bounds.max[k] = get_float(l);
+    }
+    def.transform = get_transform(l);
+    bool known = get_shape(l, &def.shape);
+    uint32_t marks = get_word(l), id = UMB_NONE;
+    bool used = (marks & UMB_CAPTURE_USED) != 0;
+    if (!known || (marks & ~(uint32_t)UMB_CAPTURE_MARKS) != 0 || (!used && (marks != 0 || def.shape != 0))) {
+        return UMB_ERROR_FORMAT;
+    }
+    def.flags = (marks & UMB_CAPTURE_LIVE) != 0 ? 0 : UMB_OBJECT_IGNORED;
+    def.flags |= (marks & UMB_CAPTURE_IS_SHAPE) != 0 ? UMB_OBJECT_IS_SHAPE : 0;
+    def.flags |= (marks & UMB_CAPTURE_HIDES) != 0 ? 0 : UMB_OBJECT_NEVER_HIDES;
+    umb_result result = umb_scene_add_object(l->out->scene, &def, &id);
+    if (result == UMB_OK && !used) {
+        result = umb_scene_remove_object(l->out->scene, id);
+    }
+    return result;
+}
+
+static umb_result read_scene(loader *l)
+{
+    umb_result result = UMB_OK;
+    l->at = l->sections[UMB_CAPTURE_OBJECTS];
+    for (uint32_t i = 0; i < l->counts[UMB_CAPTURE_OBJECTS] && result == UMB_OK; ++i) {
+        result = read_object(l);
+    }
+    if (result != UMB_OK) {
+        return fail_call(l, result, "objects");
+    }
+    l->at = l->sections[UMB_CAPTURE_OCCLUDERS];
+    for (uint32_t i = 0; i < l->counts[UMB_CAPTURE_OCCLUDERS]; ++i) {
+        umb_transform transform = get_transform(l);
+        umb_shape shape = 0;
+        uint32_t id;
+        (void)get_shape(l, &shape); /* an occluder without a shape is refused below */
+        result = umb_scene_add_occluder(l->out->scene, shape, &transform, &id);
+        if (result != UMB_OK) {
+            return fail_call(l, result, "occluders");
+        }
+    }
+    result = umb_scene_commit(l->out->scene);
+    return result == UMB_OK ? UMB_OK : fail_call(l, result, "objects");
+}
+
+static umb_result read_index(loader *l, umb_scratch *scratch)
+{
+    uint32_t count = l->counts[UMB_CAPTURE_NODES];
+    uint32_t(*refs)[UMB_NODE_WIDTH] = umb_scratch_get(scratch, count, sizeof *refs);
+    if (refs == NULL) {
+        return fail_call(l, UMB_ERROR_MEMORY, "index");
+    }
+    l->at = l->sections[UMB_CAPTURE_NODES];
+    for (uint32_t i = 0; i < count * UMB_NODE_WIDTH; ++i) {
+        refs[i / UMB_NODE_WIDTH][i % UMB_NODE_WIDTH] = get_word(l);
+    }
+    umb_index_def def = {.kind = l->out->kind, .tasks = l->tasks};
+    umb_result result = umb_index_restore(l->out->scene, &def, (const uint32_t(*)[UMB_NODE_WIDTH])refs, count,
+                                          &l->out->index);
+    return result == UMB_OK ? UMB_OK : fail_call(l, result, "index's nodes");
+}
+
+static umb_result read_answer(loader *l)
+{
+    umb_allocator allocator = umb_memory_allocator(NULL);
+    uint32_t count = l->counts[UMB_CAPTURE_ANSWER];
+    uint32_t *answer = umb_memory_allocate(&allocator, count * sizeof *answer);
+    if (answer == NULL) {
+        return fail_call(l, UMB_ERROR_MEMORY, "answer");
+    }
+    l->out->block = answer;
+    l->out->answer = answer;
+    l->out->answer_count = count;
+    l->at = l->sections[UMB_CAPTURE_ANSWER];
+    for (uint32_t i = 0; i < count; ++i) {
+        answer[i] = get_word(l);
+        if (answer[i] >= l->counts[UMB_CAPTURE_OBJECTS]) {
+            return fail(l, "an answer that names no object");
+        }
+    }
+    return UMB_OK;
+}
+
+static umb_result load(loader *l, umb_scratch *scratch)
+{
+    umb_result result = check_header(l);
+    result = result == UMB_OK ? check_sections(l) : result;
+    result = result == UMB_OK ? read_frame(l) : result;
+    if (result != UMB_OK) {
+        return result;
+    }
+    umb_scene_def def = {.origin = {l->origin[0], l->origin[1], l->origin[2]}};
+    result = umb_scene_create(&def, &l->out->scene);
+    if (result != UMB_OK) {
+        return fail_call(l, result, "origin");
+    }
+    result = read_meshes(l, scratch);
+    result = result == UMB_OK ? read_scene(l) : result;
+    result = result == UMB_OK ? read_index(l, scratch) : result;
+    result = result == UMB_OK ? read_answer(l) : result;
+    if (result != UMB_OK) {
+        return result;
+    }
+    umb_culler_def culler_def = {.method = l->out->method, .isa = l->isa};
+    result = umb_culler_create(l->out->index, &culler_def, &l->out->culler);
+    if (result == UMB_ERROR_ARGUMENT) {
+        return umb_error_set(l->error, result, "capture: instruction set %s is not available here",
+                             umb_isa_name(l->isa));
+    }
+    return result == UMB_OK ? UMB_OK : fail_call(l, result, "culler");
+}
+
+umb_result umb_capture_load(const void *bytes, size_t size, umb_isa isa, umb_tasks tasks, umb_capture *out,
+                            umb_error *error)
+{
+    memset(out, 0, sizeof *out);
+    umb_allocator allocator = umb_memory_allocator(NULL);
+    umb_scratch scratch = {.allocator = &allocator};
+    loader l = {.bytes = bytes, .size = size, .isa = isa, .tasks = tasks, .out = out, .error = error};
+    umb_result result = load(&l, &scratch);
+    umb_scratch_free(&scratch);
+    if (result != UMB_OK) {
+        umb_capture_free(out);
+    }
+    return result;
+}
+
+void umb_capture_free(umb_capture *capture)
+{
+    if (capture != NULL) {
+        umb_allocator allocator = umb_memory_allocator(NULL);
+        umb_culler_destroy(capture->culler);
+        umb_index_destroy(capture->index);
+        umb_scene_destroy(capture->scene);
+        umb_memory_free(&allocator, capture->block, capture->answer_count * sizeof *capture->answer);
+        memset(capture, 0, sizeof *capture);
+    }
+}

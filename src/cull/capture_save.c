@@ -1,0 +1,268 @@
+/* Writing a captured frame: umb_capture_save(). */
+#include <string.h>
+
+#include "base/checksum.h"
+#include "base/scratch.h"
+#include "capture_format.h"
+#include "culler.h"
+#include "index/tree.h"
+#include "umbrage/capture.h"
+
+/* What is saved, and the bytes it goes to. */
+typedef struct saver {
+    const umb_culler *culler;
+    const umb_scene *scene;
+    const umb_committed *committed;
+    const umb_tree *tree;
+    const umb_view *view;
+    const uint32_t *answer;
+    uint32_t answer_count;
+    const umb_mesh **meshes; /* all that objects and occluders name, by first use */
+    uint32_t mesh_count;
+    uint32_t *table; /* hash table of mesh numbers */
+    size_t table_size;
+    uint64_t counts[UMB_CAPTURE_SECTION_COUNT];
+    uint64_t offsets[UMB_CAPTURE_SECTION_COUNT];
+    uint64_t size;
+    uint8_t *at;
+} saver;
+
+static void put(saver *s, uint64_t value, int bytes)
+{
+    for (int i = 0; i < bytes; ++i) {
+        *s->at++ = (uint8_t)(value >> (8 * i));
+    }
+}
+
+static void put_word(saver *s, uint32_t value)
+{
+    put(s, value, 4);
+}
+
+static void put_float(saver *s, float value)
+{
+    uint32_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    put(s, bits, 4);
+}
+
+static void put_doubles(saver *s, const double *values, int count)
+{
+    for (int i = 0; i < count; ++i) {
+        uint64_t bits;
+        memcpy(&bits, &values[i], sizeof bits);
+        put(s, bits, 8);
+    }
+}
+
+/* The slot of a mesh in the hash table: its own, or the empty one where it belongs. */
+static size_t find_mesh(const saver *s, const umb_mesh *mesh)
+{
+    size_t slot = (size_t)(((uintptr_t)mesh >> 6) * 0x9E3779B97F4A7C15u >> 20) & (s->table_size - 1);
+    while (s->table[slot] != UMB_NONE && s->meshes[s->table[slot]] != mesh) {
+        slot = (slot + 1) & (s->table_size - 1);
+    }
+    return slot;
+}
+
+static void add_mesh(saver *s, const umb_mesh *mesh)
+{
+    size_t slot = mesh != NULL ? find_mesh(s, mesh) : 0;
+    if (mesh != NULL && s->table[slot] == UMB_NONE) {
+        s->table[slot] = s->mesh_count;
+        s->meshes[s->mesh_count++] = mesh;
+        s->counts[UMB_CAPTURE_POSITIONS] += mesh->position_count;
+        s->counts[UMB_CAPTURE_TRIANGLES] += mesh->seen_count;
+    }
+}
+
+static bool gather_meshes(saver *s, umb_scratch *scratch)
+{
+    const umb_committed *c = s->committed;
+    size_t most = (size_t)c->object_count + (c->occluder_count - c->first_free_occluder);
+    s->table_size = 16;
+    while (s->table_size < 2 * most) {
+        s->table_size *= 2;
+    }
+    s->table = umb_scratch_get(scratch, s->table_size, sizeof *s->table);
+    s->meshes = umb_scratch_get(scratch, most, sizeof *s->meshes);
+    if (scratch->failed) {
+        return false;
+    }
+    memset(s->table, 0xFF, s->table_size * sizeof *s->table);
+    for (uint32_t i = 0; i < c->object_count; ++i) {
+        add_mesh(s, c->objects[i].mesh);
+    }
+    for (uint32_t i = c->first_free_occluder; i < c->occluder_count; ++i) {
+        add_mesh(s, c->occluders[i].mesh);
+    }
+    return true;
+}
+
+static void lay_out(saver *s)
+{
+    s->counts[UMB_CAPTURE_FRAME] = 1;
+    s->counts[UMB_CAPTURE_MESHES] = s->mesh_count;
+    s->counts[UMB_CAPTURE_FLAGS] = s->counts[UMB_CAPTURE_TRIANGLES];
+    s->counts[UMB_CAPTURE_OBJECTS] = s->committed->object_count;
+    s->counts[UMB_CAPTURE_OCCLUDERS] = s->committed->occluder_count - s->committed->first_free_occluder;
+    s->counts[UMB_CAPTURE_NODES] = s->tree->node_count;
+    s->counts[UMB_CAPTURE_ANSWER] = s->answer_count;
+    s->size = UMB_CAPTURE_HEADER;
+    for (int k = 0; k < UMB_CAPTURE_SECTION_COUNT; ++k) {
+        s->offsets[k] = umb_capture_align(s->size);
+        s->size = s->offsets[k] + s->counts[k] * umb_capture_record_bytes(k);
+    }
+}
+
+static void put_frame(saver *s)
+{
+    const umb_view *v = s->view;
+    put_doubles(s, umb_scene_origin(s->scene), 3);
+    put_doubles(s, v->eye, 3);
+    put_doubles(s, v->right, 3);
+    put_doubles(s, v->up, 3);
+    put_doubles(s, v->forward, 3);
+    const double numbers[8] = {v->x_min,     v->x_max,      v->y_min, v->y_max, v->near_depth,
+                               v->far_depth, v->min_pixels, v->time};
+    put_doubles(s, numbers, 8);
+    for (uint32_t i = 0; i < UMB_MAX_CLIP_PLANES; ++i) {
+        static const double none[4] = {0, 0, 0, 0};
+        put_doubles(s, i < v->plane_count ? v->planes[i] : none, 4);
+    }
+    const uint32_t words[8] = {(uint32_t)umb_culler_settings(s->culler).method,
+                               (uint32_t)umb_index_get_kind(umb_culler_index(s->culler)),
+                               (uint32_t)v->projection,
+                               v->width,
+                               v->height,
+                               v->buffer_width,
+                               v->buffer_height,
+                               v->plane_count};
+    for (int i = 0; i < 8; ++i) {
+        put_word(s, words[i]);
+    }
+}
+
+static void put_meshes(saver *s, uint8_t *bytes)
+{
+    for (uint32_t m = 0; m < s->mesh_count; ++m) {
+        put_word(s, s->meshes[m]->position_count);
+        put_word(s, s->meshes[m]->seen_count);
+    }
+    s->at = bytes + s->offsets[UMB_CAPTURE_POSITIONS];
+    for (uint32_t m = 0; m < s->mesh_count; ++m) {
+        for (uint32_t i = 0; i < 3 * s->meshes[m]->position_count; ++i) {
+            put_float(s, s->meshes[m]->positions[i / 3][i % 3]);
+        }
+    }
+    s->at = bytes + s->offsets[UMB_CAPTURE_TRIANGLES];
+    for (uint32_t m = 0; m < s->mesh_count; ++m) {
+        for (uint64_t i = 0; i < 3 * (uint64_t)s->meshes[m]->seen_count; ++i) {
+            put_word(s, s->meshes[m]->triangles[i / 3][i % 3]);
+        }
+    }
+    s->at = bytes + s->offsets[UMB_CAPTURE_FLAGS];
+    for (uint32_t m = 0; m < s->mesh_count; ++m) {
+        const umb_mesh *mesh = s->meshes[m];
+        for (uint32_t t = 0; t < mesh->seen_count; ++t) {
+            bool blocks = t < mesh->triangle_count;
+            put(s, !blocks ? UMB_TRIANGLE_OPEN : mesh->two_sided[t] ? UMB_TRIANGLE_TWO_SIDED : 0, 1);
+        }
+    }
+}
+
+static void put_transform(saver *s, const umb_transform *t)
+{
+    for (int i = 0; i < 12; ++i) {
+        put_float(s, t->m[i / 4][i % 4]);
+    }
+}
+
+static void put_objects(saver *s, uint8_t *bytes)
+{
+    const umb_committed *c = s->committed;
+    for (uint32_t i = 0; i < c->object_count; ++i) {
+        const umb_object *o = &c->objects[i];
+        for (int k = 0; k < 3; ++k) {
+            put_float(s, o->bounds.min[k]);
+        }
+        for (int k = 0; k < 3; ++k) {
+            put_float(s, o->bounds.max[k]);
+        }
+        put_transform(s, &o->transform);
+        put_word(s, o->mesh != NULL ? s->table[find_mesh(s, o->mesh)] : UMB_NONE);
+        put_word(s, (o->used ? UMB_CAPTURE_USED : 0u) | (o->live ? UMB_CAPTURE_LIVE : 0u) |
+                        (o->refine ? UMB_CAPTURE_IS_SHAPE : 0u) |
+                        (o->occluder != UMB_NONE ? UMB_CAPTURE_HIDES : 0u));
+    }
+    s->at = bytes + s->offsets[UMB_CAPTURE_OCCLUDERS];
+    for (uint32_t i = c->first_free_occluder; i < c->occluder_count; ++i) {
+        put_transform(s, &c->occluders[i].transform);
+        put_word(s, s->table[find_mesh(s, c->occluders[i].mesh)]);
+    }
+}
+
+static void put_all(saver *s, uint8_t *bytes)
+{
+    memset(bytes, 0, (size_t)s->size);
+    s->at = bytes + UMB_CAPTURE_TABLE;
+    for (int k = 0; k < UMB_CAPTURE_SECTION_COUNT; ++k) {
+        put(s, s->offsets[k], 8);
+        put(s, s->counts[k], 8);
+    }
+    s->at = bytes + s->offsets[UMB_CAPTURE_FRAME];
+    put_frame(s);
+    s->at = bytes + s->offsets[UMB_CAPTURE_MESHES];
+    put_meshes(s, bytes);
+    s->at = bytes + s->offsets[UMB_CAPTURE_OBJECTS];
+    put_objects(s, bytes);
+    s->at = bytes + s->offsets[UMB_CAPTURE_NODES];
+    for (uint32_t n = 0; n < s->tree->node_count; ++n) {
+        for (uint32_t k = 0; k < UMB_NODE_WIDTH; ++k) {
+            put_word(s, k < s->tree->nodes[n].count ? s->tree->nodes[n].ref[k] : UMB_NONE);
+        }
+    }
+    s->at = bytes + s->offsets[UMB_CAPTURE_ANSWER];
+    for (uint32_t i = 0; i < s->answer_count; ++i) {
+        put_word(s, s->answer[i]);
+    }
+    uint64_t sum = umb_checksum(bytes + UMB_CAPTURE_TABLE, (size_t)s->size - UMB_CAPTURE_TABLE);
+    s->at = bytes;
+    memcpy(s->at, UMB_CAPTURE_MAGIC, 8);
+    s->at += 8;
+    put_word(s, UMB_CAPTURE_VERSION);
+    put_word(s, UMB_CAPTURE_HEADER);
+    put(s, s->size, 8);
+    put(s, sum, 8);
+}
+
+umb_result umb_capture_save(const umb_culler *culler, void *bytes, size_t capacity, size_t *size)
+{
+    *size = 0;
+    saver s = {.culler = culler};
+    s.view = umb_culler_last_view(culler, &s.answer, &s.answer_count);
+    if (s.view == NULL) {
+        return umb_error_set(umb_culler_settings(culler).error, UMB_ERROR_STATE,
+                             "nothing to capture: no view has been answered since the scene changed");
+    }
+    const umb_index *index = umb_culler_index(culler);
+    s.scene = umb_index_scene(index);
+    s.committed = umb_scene_committed(s.scene);
+    s.tree = umb_index_tree(index);
+    umb_scratch scratch = {.allocator = umb_scene_allocator(s.scene)};
+    umb_result result = UMB_OK;
+    if (!gather_meshes(&s, &scratch)) {
+        result = umb_error_set(umb_culler_settings(culler).error, UMB_ERROR_MEMORY, "no memory for a capture");
+    } else {
+        lay_out(&s);
+        *size = (size_t)s.size;
+        if (bytes != NULL && capacity < s.size) {
+            result = umb_error_set(umb_culler_settings(culler).error, UMB_ERROR_ARGUMENT,
+                                   "a capture needs %llu bytes", (unsigned long long)s.size);
+        } else if (bytes != NULL) {
+            put_all(&s, bytes);
+        }
+    }
+    umb_scratch_free(&scratch);
+    return result;
+}
