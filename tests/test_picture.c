@@ -214,10 +214,46 @@ static void test_occlusion(void **state)
     tear_down(s);
 }
 
+/* Depths come back out of the buffer: the wall's front is 5 ahead, and bounds lie at or behind it. */
+static void test_depths(void **state)
+{
+    (void)state;
+    stage *s = set_up(false);
+    umb_error error = {0};
+    umb_scene *scene = model_scene(s->m, true, (umb_tasks){0}, NULL, &error);
+    umb_index *index;
+    umb_culler *culler;
+    const double eye[3] = {0, 1.5, 0}, target[3] = {0, 1.5, -1}, up[3] = {0, 1, 0};
+    assert_int_equal(umb_index_create(scene, &(umb_index_def){0}, &index), UMB_OK);
+    assert_int_equal(umb_culler_create(index, &(umb_culler_def){0}, &culler), UMB_OK);
+    for (int parallel = 0; parallel < 2; ++parallel) {
+        umb_view view = s->view;
+        umb_visible_set seen;
+        uint32_t width, height;
+        double nearest, farthest;
+        if (parallel) {
+            assert_int_equal(umb_view_look_at_ortho(&view, eye, target, up, 20, 2, -3, 100), UMB_OK);
+        }
+        assert_int_equal(umb_cull(culler, &view, &seen), UMB_OK);
+        umb_culler_read_buffer(culler, NULL, 0, &width, &height);
+        float *values = malloc(sizeof *values * width * height);
+        assert_true(umb_culler_read_buffer(culler, values, (size_t)width * height, &width, &height));
+        assert_true(depth_range(&view, values, (size_t)width * height, &nearest, &farthest));
+        assert_true(nearest > 4.999 && nearest < 6.001);
+        assert_true(farthest < 14.001);
+        free(values);
+    }
+    umb_culler_destroy(culler);
+    umb_index_destroy(index);
+    umb_scene_destroy(scene);
+    tear_down(s);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_states), cmocka_unit_test(test_ids),
-                                       cmocka_unit_test(test_eye), cmocka_unit_test(test_map),
-                                       cmocka_unit_test(test_occlusion)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_states),    cmocka_unit_test(test_ids),
+        cmocka_unit_test(test_eye),       cmocka_unit_test(test_map),
+        cmocka_unit_test(test_occlusion), cmocka_unit_test(test_depths)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

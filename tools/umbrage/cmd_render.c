@@ -139,6 +139,9 @@ static int prepare(easel *e)
     if (!e->states) {
         return fail(o, EXIT_INPUT, "not enough memory");
     }
+    if (options_given(o, "up")) {
+        memcpy(e->s->model->up, o->up, sizeof o->up);
+    }
     picture_states(m, &e->view, set.objects, set.count, e->states);
     if (o->pictures & (PICTURE_EYE | PICTURE_IDS)) {
         e->oracle = truth_create(m, &error);

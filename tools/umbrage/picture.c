@@ -90,13 +90,13 @@ static bool depth_range(const umb_view *view, float *values, size_t count, doubl
 {
     *near_depth = INFINITY;
     *far_depth = -INFINITY;
+    bool parallel = view->projection == UMB_ORTHOGRAPHIC;
     for (size_t k = 0; k < count; ++k) {
         if (values[k] == 0) {
             values[k] = INFINITY;
             continue;
         }
-        values[k] = view->projection == UMB_ORTHOGRAPHIC ? (float)(view->far_depth + 1 - values[k])
-                                                         : 1 / values[k];
+        values[k] = (float)(1.0 / values[k] + (parallel ? view->near_depth - 1.0 : 0.0));
         *near_depth = fmin(*near_depth, values[k]);
         *far_depth = fmax(*far_depth, values[k]);
     }
