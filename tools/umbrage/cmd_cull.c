@@ -27,6 +27,22 @@ static int time_answers(const setup *s, const options *o, const umb_view *view, 
     return code;
 }
 
+static int save_capture(const setup *s, const options *o)
+{
+    size_t size = 0;
+    umb_result result = umb_capture_save(s->culler, NULL, 0, &size);
+    void *bytes = result == UMB_OK ? malloc(size) : NULL;
+    if (bytes) {
+        result = umb_capture_save(s->culler, bytes, size, &size);
+    }
+    int code = bytes && result == UMB_OK
+                   ? part_file_write(o, o->capture, bytes, size)
+                   : fail(o, EXIT_INPUT, "%s: the frame cannot be captured: %s", o->capture,
+                          umb_result_name(result == UMB_OK ? UMB_ERROR_MEMORY : result));
+    free(bytes);
+    return code;
+}
+
 static int print_json(const frame *f, const options *o)
 {
     json_text j = {0};
@@ -63,6 +79,9 @@ int cmd_cull(const options *o)
         code = time_answers(&s, o, &view, &f);
         if (code == EXIT_DONE) {
             code = frame_count_in_frustum(&s, o, &view, &f.in_frustum);
+        }
+        if (code == EXIT_DONE && o->capture) {
+            code = save_capture(&s, o);
         }
     }
     if (code == EXIT_DONE) {

@@ -5,6 +5,7 @@
 
 #include "frame.h"
 #include "part_file.h"
+#include "progress.h"
 #include "truth/truth.h"
 
 enum { MOST_BLOCKERS = 16 };
@@ -55,6 +56,7 @@ static int ask_oracle(const setup *s, const options *o, const umb_view *view, ex
                           .accused = accused,
                           .threads = o->threads};
     int code = EXIT_DONE;
+    progress_note(o, "tracing rays");
     if (!accused) {
         code = fail(o, EXIT_INPUT, "not enough memory");
     } else {
@@ -70,6 +72,7 @@ static int ask_oracle(const setup *s, const options *o, const umb_view *view, ex
         out->blocker_count = truth_blockers(oracle, view, o->object, out->blockers, out->hits,
                                             MOST_BLOCKERS);
     }
+    progress_note(o, NULL);
     truth_destroy(oracle);
     free(accused);
     return code;

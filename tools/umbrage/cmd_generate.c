@@ -6,6 +6,7 @@
 #include "io/write_glb.h"
 #include "json_text.h"
 #include "part_file.h"
+#include "progress.h"
 #include "setup.h"
 
 static int write_model(const model *m, const options *o)
@@ -15,6 +16,7 @@ static int write_model(const model *m, const options *o)
     if (!place) {
         return fail(o, EXIT_INPUT, "%s: not enough memory", o->output);
     }
+    progress_note(o, "writing the file");
     if (!write_glb(m, place, &error)) {
         /* The message begins with the name that was written to, which is not the user's. */
         size_t length = strlen(place);
@@ -24,6 +26,7 @@ static int write_model(const model *m, const options *o)
         part_file_end(false);
         return code;
     }
+    progress_note(o, NULL);
     return part_file_end(true)
                ? EXIT_DONE
                : fail(o, EXIT_INPUT, "%s: cannot be written: %s", o->output, strerror(errno));

@@ -20,6 +20,8 @@ static const command commands[COMMAND_COUNT] = {
                         "Pictures of a view", cmd_render},
     [COMMAND_GENERATE] = {"generate", "gen:NAME,key=value", "-o FILE.glb",
                           "Write a generated scene to a file", cmd_generate},
+    [COMMAND_REPLAY] = {"replay", "FILE", "[options]", "Answer a captured frame again and compare",
+                        cmd_replay},
 };
 
 static void print_help(void)

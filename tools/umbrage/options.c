@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #define BIT(command) (1u << COMMAND_##command)
 
@@ -254,6 +255,12 @@ static const char *read_repeat(options *o, const char *text)
     return count(text, 1, 100000, &o->repeat) ? NULL : "a whole number from 1 to 100000";
 }
 
+static const char *read_capture(options *o, const char *text)
+{
+    o->capture = text;
+    return *text ? NULL : "a file name";
+}
+
 static const char *read_grid(options *o, const char *text)
 {
     return size(text, 32768, &o->grid_width, &o->grid_height) ? NULL : "WxH, both from 1 to 32768";
@@ -336,9 +343,9 @@ static const option_spec specs[] = {
     {"min-pixels", 0, VIEWS, "P", read_min_pixels,
      "drop objects under P pixels both ways (default 0: none)"},
     {"no-weld", 0, SCENES, NULL, read_flag, "do not join touching objects into common occluders"},
-    {"threads", 0, SCENES, "N", read_threads,
+    {"threads", 0, SCENES | BIT(REPLAY), "N", read_threads,
      "threads to build and trace with (default 1)"},
-    {"isa", 0, VIEWS, "NAME", read_isa,
+    {"isa", 0, VIEWS | BIT(REPLAY), "NAME", read_isa,
      "auto, scalar, sse4, avx2 or neon (default auto)"},
 
     {"two-sided", 0, SCENES, NULL, read_two_sided, "faces block from both sides"},
@@ -349,6 +356,7 @@ static const option_spec specs[] = {
 
     {"list", 0, BIT(INFO) | BIT(CULL) | BIT(WALK), NULL, read_flag, "list the objects too"},
     {"repeat", 0, BIT(CULL), "N", read_repeat, "answers that the time is the median of (default 5)"},
+    {"capture", 0, BIT(CULL), "FILE", read_capture, "write the frame for umbrage replay"},
     {"grid", 0, BIT(CHECK) | BIT(EXPLAIN), "WxH", read_grid,
      "first rays of the oracle (default: --size)"},
     {"rays", 0, BIT(CHECK) | BIT(EXPLAIN), "N", read_rays, "most guided rays a view (default 4M)"},
@@ -368,7 +376,8 @@ _Static_assert(SPEC_COUNT <= 64, "options.given has a bit for each");
 int fail(const options *o, int code, const char *format, ...)
 {
     va_list arguments;
-    fprintf(stderr, "umbrage %s: ", o->command);
+    /* Over whatever progress a terminal shows. */
+    fprintf(stderr, "%sumbrage %s: ", isatty(STDERR_FILENO) ? "\r\033[K" : "", o->command);
     va_start(arguments, format);
     vfprintf(stderr, format, arguments);
     va_end(arguments);

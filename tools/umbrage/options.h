@@ -31,7 +31,7 @@ typedef struct options {
 
     model_options model;
     const char *seed; /* digits, or NULL */
-    const char *path, *output;
+    const char *path, *output, *capture;
 
     double eye[3], target[3], up[3];
     double fov, ortho_height, near_depth, far_depth, min_pixels;
@@ -66,6 +66,7 @@ enum {
     COMMAND_EXPLAIN,
     COMMAND_RENDER,
     COMMAND_GENERATE,
+    COMMAND_REPLAY,
     COMMAND_COUNT
 };
 
@@ -76,6 +77,7 @@ int cmd_check(const options *o);
 int cmd_explain(const options *o);
 int cmd_render(const options *o);
 int cmd_generate(const options *o);
+int cmd_replay(const options *o);
 
 /* Read the words after the subcommand. EXIT_DONE, or EXIT_USAGE with the message printed. *help is set
  * when help was asked for; nothing else is meaningful then. */

@@ -45,3 +45,14 @@ void progress_end(progress *p)
         fputs("\r\033[K", stderr);
     }
 }
+
+void progress_note(const options *o, const char *what)
+{
+    bool terminal = isatty(STDERR_FILENO) != 0;
+    if (terminal) {
+        fprintf(stderr, "\r\033[K%s", what ? what : "");
+        fflush(stderr);
+    } else if (what && options_given(o, "progress")) {
+        fprintf(stderr, "%s\n", what);
+    }
+}

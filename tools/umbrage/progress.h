@@ -18,6 +18,9 @@ void progress_step(progress *p, uint32_t done);
 /* Clear the line. */
 void progress_end(progress *p);
 
+/* Say what is being done, for work without steps; NULL: it is done. Silent as above. */
+void progress_note(const options *o, const char *what);
+
 /* Milliseconds of a clock that only goes forward. */
 double progress_clock(void);
 

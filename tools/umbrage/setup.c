@@ -52,7 +52,9 @@ int setup_model(setup *s, const options *o)
 {
     memset(s, 0, sizeof *s);
     double start = progress_clock();
+    progress_note(o, "reading the scene");
     s->model = load_model(o, &s->error);
+    progress_note(o, NULL);
     if (!s->model) {
         return load_failure(o, o->input, &s->error);
     }
@@ -74,6 +76,7 @@ int setup_scene(setup *s, const options *o)
         s->tasks = umb_pool_tasks(s->pool);
     }
     bool weld = !options_given(o, "no-weld");
+    progress_note(o, "building scene and index");
     s->scene = model_scene(s->model, weld, s->tasks, &s->weld, &s->error);
     if (!s->scene) {
         return fail(o, EXIT_INPUT, "%s: %s", o->input, s->error.text);
@@ -83,6 +86,7 @@ int setup_scene(setup *s, const options *o)
     if (result != UMB_OK) {
         return fail(o, EXIT_INPUT, "%s: the index: %s", o->input, umb_result_name(result));
     }
+    progress_note(o, NULL);
     s->build_ms = nearbyint((progress_clock() - start) * 1e3) / 1e3;
     return EXIT_DONE;
 }
