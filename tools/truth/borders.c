@@ -15,9 +15,10 @@
 #define SAMPLE_PIXELS 1.0
 #define HALVINGS 5
 
-/* How far beside an edge, in grid cells. 0: along the edge itself, where cracks between triangles that
- * only nearly meet (T-junctions) let rays through; shared edges do not. */
-static const double beside[] = {0.0, 1e-3, 0.3};
+/* How far beside an edge, in grid cells: each ray anywhere between, evenly in the logarithm, since slits
+ * have no natural width. 0: along the edge itself, where cracks between triangles that only nearly meet
+ * (T-junctions) let rays through; shared edges do not. */
+static const double beside[][2] = {{0.0, 0.0}, {1e-5, 1e-2}, {1e-2, 0.5}};
 
 typedef struct half_edge {
     uint32_t low, high; /* corners, welded by position */
@@ -252,12 +253,17 @@ static void halve(worker *w, const border *b, double x0, double x1, uint32_t see
     }
 }
 
-static void walk(worker *w, const border *b, uint64_t seed, double pixels)
+static void walk(worker *w, const border *b, uint64_t seed, const double range[2])
 {
     uint32_t before = MODEL_NONE;
     double x_before = 0.0;
+    w->along_edge = range[1] == 0.0;
     for (uint32_t i = 0; i < b->samples; ++i) {
         double x = (i + 0.02 + 0.96 * oracle_unit(oracle_mix(seed, i, 7))) / b->samples;
+        double pixels = 0.0;
+        if (!w->along_edge) {
+            pixels = range[0] * pow(range[1] / range[0], oracle_unit(oracle_mix(seed, i, 8)));
+        }
         uint32_t seen = cast_beside(w, b, x, pixels);
         if (i > 0 && seen != before) {
             halve(w, b, x_before, x, before, seen, pixels);
@@ -265,6 +271,7 @@ static void walk(worker *w, const border *b, uint64_t seed, double pixels)
         before = seen;
         x_before = x;
     }
+    w->along_edge = false;
 }
 
 void border_item(worker *w, uint64_t item)
@@ -304,9 +311,7 @@ void border_item(worker *w, uint64_t item)
         }
         plan_samples(s, &b);
         for (uint32_t k = 0; k < sizeof(beside) / sizeof(beside[0]); ++k) {
-            w->along_edge = beside[k] == 0.0;
             walk(w, &b, oracle_mix(number, (uint64_t)i, k), beside[k]);
-            w->along_edge = false;
         }
     }
 }

@@ -110,22 +110,25 @@ static bool in_view(confirmation *c, const exact_crossing *at)
            side_sign(c, view->up, view->y_max, at) <= 0;
 }
 
-static bool is_corner(const confirmation *c, float v[3][3])
+/* Does the point that the line was drawn through lie on an edge, exactly? */
+static bool is_on_border(confirmation *c, float v[3][3])
 {
     for (int i = 0; i < 3; ++i) {
-        if (v[i][0] == c->through[0] && v[i][1] == c->through[1] && v[i][2] == c->through[2]) {
+        const float *a = v[i], *b = v[(i + 1) % 3];
+        double from[3] = {a[0], a[1], a[2]}, to[3] = {b[0], b[1], b[2]};
+        if (exact_on_segment(c->through, from, to, &c->lost)) {
             return true;
         }
     }
     return false;
 }
 
-/* Where the line meets a triangle of the object: a crossing, or, edge-on and without area, a corner that
- * the line was drawn through. */
+/* Where the line meets a triangle of the object: a crossing, or, edge-on and without area, the point of
+ * its border that the line was drawn through. */
 static bool reach(confirmation *c, float v[3][3], exact_crossing *at)
 {
     exact_meeting meeting = exact_line_triangle(&c->line, v, at, &c->lost);
-    if (meeting == EXACT_IN_PLANE && is_corner(c, v)) {
+    if (meeting == EXACT_IN_PLANE && is_on_border(c, v)) {
         bool perspective = c->v->view->projection == UMB_PERSPECTIVE;
         exact_set(&at->numerator, perspective ? 1.0 : 0.0);
         exact_set(&at->denominator, 1.0);
@@ -244,6 +247,34 @@ bool oracle_confirm(const truth *t, const oracle_view *v, const double through[3
     return true;
 }
 
+/* What has no area, or none seen from here, is met only by lines drawn through points of its border that
+ * doubles can say: corners, and 1024ths of an edge near the point where rays met it. */
+static bool confirm_on_border(const truth *t, const oracle_view *v, const double through[3],
+                              uint32_t object, float corner[3][3], uint8_t renderer,
+                              truth_witness *out)
+{
+    for (int k = 0; k < 3; ++k) {
+        const float *a = corner[k], *b = corner[(k + 1) % 3];
+        double along = 0.0, square = 0.0;
+        for (int i = 0; i < 3; ++i) {
+            along += (through[i] - a[i]) * ((double)b[i] - a[i]);
+            square += ((double)b[i] - a[i]) * ((double)b[i] - a[i]);
+        }
+        double nearest = square > 0.0 ? floor(fmin(fmax(along / square, 0.0), 1.0) * 1024.0) : 0.0;
+        for (int j = -1; j < 4; ++j) {
+            double point[3], share = j < 0 ? 0.0 : (nearest - 1.0 + j) / 1024.0;
+            for (int i = 0; i < 3; ++i) {
+                point[i] = a[i] + share * ((double)b[i] - a[i]);
+            }
+            if (share >= 0.0 && share <= 1.0 &&
+                oracle_confirm(t, v, point, object, renderer, out)) {
+                return true;
+            }
+        }
+    }
+    return false;
+}
+
 bool oracle_confirm_near(const truth *t, const oracle_view *v, const double through[3],
                          uint32_t object, uint32_t triangle, uint8_t renderer, truth_witness *out)
 {
@@ -267,11 +298,5 @@ bool oracle_confirm_near(const truth *t, const oracle_view *v, const double thro
             return true;
         }
     }
-    for (int i = 0; i < 3; ++i) {
-        double point[3] = {corner[i][0], corner[i][1], corner[i][2]};
-        if (oracle_confirm(t, v, point, object, renderer, out)) {
-            return true;
-        }
-    }
-    return false;
+    return confirm_on_border(t, v, through, object, corner, renderer, out);
 }

@@ -414,3 +414,18 @@ bool exact_degenerate(float v[3][3], bool *lost)
     return exact_sign(&n[0], lost) == 0 && exact_sign(&n[1], lost) == 0 &&
            exact_sign(&n[2], lost) == 0;
 }
+
+bool exact_on_segment(const double p[3], const double a[3], const double b[3], bool *lost)
+{
+    exact ab[3], ap[3], n[3];
+    for (int i = 0; i < 3; ++i) {
+        if (p[i] < (a[i] < b[i] ? a[i] : b[i]) || p[i] > (a[i] > b[i] ? a[i] : b[i])) {
+            return false;
+        }
+        exact_difference(&ab[i], b[i], a[i]);
+        exact_difference(&ap[i], p[i], a[i]);
+    }
+    cross(n, ab, ap);
+    return exact_sign(&n[0], lost) == 0 && exact_sign(&n[1], lost) == 0 &&
+           exact_sign(&n[2], lost) == 0;
+}

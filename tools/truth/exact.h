@@ -64,6 +64,9 @@ bool exact_in_plane_free(const exact_line *line, float v[3][3], const exact_cros
 /* True if the triangle has no area. */
 bool exact_degenerate(float v[3][3], bool *lost);
 
+/* True if p lies on the closed segment from a to b. */
+bool exact_on_segment(const double p[3], const double a[3], const double b[3], bool *lost);
+
 /* sum over i of direction[i] * k[i]. */
 void exact_direction_dot(const exact_line *line, const double k[3], exact *out);
 /* sum over i of (point[i] - from[i]) * k[i]; from NULL: zero. */
