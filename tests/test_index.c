@@ -282,6 +282,14 @@ static void test_commits(void **state)
         assert_int_equal(umb_scene_commit(scene), UMB_OK);
         if (moves_only && round % 40 != 39) {
             assert_ptr_equal(umb_index_tree(indices[0])->nodes, before);
+            /* Following a few moves gives what a full refit gives. */
+            uint32_t count = umb_index_tree(indices[0])->node_count;
+            umb_node *copy = malloc(count * sizeof(copy[0]));
+            assert_non_null(copy);
+            memcpy(copy, before, count * sizeof(copy[0]));
+            umb_bvh_refit(copy, count, umb_scene_committed(scene));
+            assert_memory_equal(copy, before, count * sizeof(copy[0]));
+            free(copy);
         }
         check_index(indices[0]);
         check_index(indices[1]);

@@ -176,3 +176,48 @@ void umb_bvh_refit(umb_node *nodes, uint32_t node_count, const umb_committed *sc
         umb_node_pad(node);
     }
 }
+
+void umb_bvh_find_places(const umb_node *nodes, uint32_t node_count, uint32_t *places,
+                         uint32_t object_count)
+{
+    for (uint32_t i = 0; i < object_count; ++i) {
+        places[i] = UMB_NONE;
+    }
+    for (uint32_t k = 0; k < node_count; ++k) {
+        for (uint32_t slot = 0; slot < nodes[k].count; ++slot) {
+            uint32_t ref = nodes[k].ref[slot];
+            if ((ref & UMB_REF_KIND) == UMB_REF_OBJECT) {
+                places[ref & UMB_REF_NUMBER] = k * UMB_NODE_WIDTH + slot;
+            }
+        }
+    }
+}
+
+static void lift(umb_node *nodes, uint32_t number, uint32_t slot, umb_aabb box)
+{
+    for (;;) {
+        umb_node *node = &nodes[number];
+        umb_aabb before = umb_node_bounds(node);
+        set_slot(node, slot, box.min, box.max, node->ref[slot]);
+        umb_node_pad(node);
+        box = umb_node_bounds(node);
+        /* By bits, so that the result is that of a full refit to the sign of a zero. */
+        if (node->parent == UMB_NONE || memcmp(&before, &box, sizeof(box)) == 0) {
+            return;
+        }
+        for (slot = 0; nodes[node->parent].ref[slot] != (UMB_REF_NODE | number); ++slot) {
+        }
+        number = node->parent;
+    }
+}
+
+void umb_bvh_refit_moved(umb_node *nodes, const uint32_t *places, const umb_committed *scene)
+{
+    for (uint32_t i = 0; i < scene->moved_count; ++i) {
+        uint32_t place = places[scene->moved[i]];
+        if (place != UMB_NONE) {
+            lift(nodes, place / UMB_NODE_WIDTH, place % UMB_NODE_WIDTH,
+                 scene->objects[scene->moved[i]].bounds);
+        }
+    }
+}

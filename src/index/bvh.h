@@ -22,6 +22,13 @@ umb_result umb_bvh_build(const umb_allocator *a, const umb_tasks *tasks, umb_bvh
 /* Put the committed boxes into the slots again, leaves to root; the structure stays. */
 void umb_bvh_refit(umb_node *nodes, uint32_t node_count, const umb_committed *scene);
 
+/* Where each object is: 8 * node + slot; UMB_NONE for those in no node. places has object_count entries. */
+void umb_bvh_find_places(const umb_node *nodes, uint32_t node_count, uint32_t *places,
+                         uint32_t object_count);
+/* The same as umb_bvh_refit() when only the committed `moved` objects moved: from each of them up, as
+ * far as boxes change. */
+void umb_bvh_refit_moved(umb_node *nodes, const uint32_t *places, const umb_committed *scene);
+
 /* Make the slots from count on as the layout wants them: slot 0's box, no reference. */
 void umb_node_pad(umb_node *node);
 /* Box around a node's slots. */

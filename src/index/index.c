@@ -5,7 +5,8 @@
 
 struct umb_index {
     umb_tree tree;
-    umb_node *nodes; /* what tree.nodes points at */
+    umb_node *nodes;  /* what tree.nodes points at */
+    uint32_t *places; /* of each object (umb_bvh_find_places) */
     umb_scene *scene;
     umb_scene_listener listener;
     umb_allocator allocator;
@@ -95,10 +96,25 @@ static umb_aabb bounds_of(const umb_node *nodes, uint32_t node_count, bool flat)
     return all;
 }
 
-static void adopt(umb_index *index, const umb_committed *c, umb_node *nodes, uint32_t node_count,
-                  uint32_t item_count)
+static void drop(umb_index *index)
 {
     umb_memory_free(&index->allocator, index->nodes, index->tree.node_count * sizeof(umb_node));
+    umb_memory_free(&index->allocator, index->places,
+                    index->object_count * sizeof(index->places[0]));
+}
+
+/* Take over new nodes, or free them when there is no memory to follow their objects. */
+static umb_result adopt(umb_index *index, const umb_committed *c, umb_node *nodes,
+                        uint32_t node_count, uint32_t item_count)
+{
+    uint32_t *places = umb_memory_allocate(&index->allocator, c->object_count * sizeof(places[0]));
+    if (places == NULL) {
+        umb_memory_free(&index->allocator, nodes, node_count * sizeof(umb_node));
+        return UMB_ERROR_MEMORY;
+    }
+    drop(index);
+    umb_bvh_find_places(nodes, node_count, places, c->object_count);
+    index->places = places;
     index->nodes = nodes;
     index->tree.nodes = nodes;
     index->tree.node_count = node_count;
@@ -107,6 +123,7 @@ static void adopt(umb_index *index, const umb_committed *c, umb_node *nodes, uin
     index->object_count = c->object_count;
     index->first_free_occluder = c->first_free_occluder;
     index->occluder_count = c->occluder_count;
+    return UMB_OK;
 }
 
 static umb_result rebuild(umb_index *index, const umb_committed *c)
@@ -118,10 +135,11 @@ static umb_result rebuild(umb_index *index, const umb_committed *c)
     uint32_t count = count_items(c);
     umb_node *nodes = NULL;
     uint32_t node_count = 0;
+    umb_result result = UMB_OK;
     if (count > 0) {
         const umb_allocator *a = &index->allocator;
         umb_bvh_item *items = umb_memory_allocate(a, count * sizeof(items[0]));
-        umb_result result = UMB_ERROR_MEMORY;
+        result = UMB_ERROR_MEMORY;
         if (items != NULL) {
             gather_items(c, items);
             result = index->tree.flat
@@ -129,11 +147,13 @@ static umb_result rebuild(umb_index *index, const umb_committed *c)
                          : umb_bvh_build(a, &index->tasks, items, count, &nodes, &node_count);
         }
         umb_memory_free(a, items, count * sizeof(items[0]));
-        if (result != UMB_OK) {
-            return umb_scene_fail(index->scene, result, "no memory to index %u items", count);
-        }
     }
-    adopt(index, c, nodes, node_count, count);
+    if (result == UMB_OK) {
+        result = adopt(index, c, nodes, node_count, count);
+    }
+    if (result != UMB_OK) {
+        return umb_scene_fail(index->scene, result, "no memory to index %u items", count);
+    }
     return UMB_OK;
 }
 
@@ -152,7 +172,14 @@ static umb_result update(void *user)
         return UMB_OK;
     }
     if (only_moved(index, c)) {
-        umb_bvh_refit(index->nodes, index->tree.node_count, c);
+        /* A few moves since the version shown: only their ways to the root. */
+        bool few = index->tree.version + 1 == c->version &&
+                   c->moved_count < index->tree.item_count / 16;
+        if (few) {
+            umb_bvh_refit_moved(index->nodes, index->places, c);
+        } else {
+            umb_bvh_refit(index->nodes, index->tree.node_count, c);
+        }
     } else {
         umb_result result = rebuild(index, c);
         if (result != UMB_OK) {
@@ -184,8 +211,9 @@ static uint32_t place_of(const restorer *r, uint32_t node, uint32_t ref)
     case UMB_REF_NODE:
         return !r->flat && number > node && number < r->node_count ? number : UMB_NONE;
     case UMB_REF_OBJECT:
-        return number < r->scene->object_count && r->scene->objects[number].live ? r->node_count + number
-                                                                                  : UMB_NONE;
+        return number < r->scene->object_count && r->scene->objects[number].live
+                   ? r->node_count + number
+                   : UMB_NONE;
     case UMB_REF_OCCLUDER:
         return number >= r->scene->first_free_occluder && number < r->scene->occluder_count
                    ? r->node_count + r->scene->object_count + number
@@ -219,7 +247,8 @@ static bool restore_node(restorer *r, uint32_t k, const uint32_t refs[UMB_NODE_W
     return node->count > 0 && (r->flat || k == 0 || r->seen[k]);
 }
 
-static umb_result restore_nodes(umb_index *index, const uint32_t (*refs)[UMB_NODE_WIDTH], uint32_t node_count)
+static umb_result restore_nodes(umb_index *index, const uint32_t (*refs)[UMB_NODE_WIDTH],
+                                uint32_t node_count)
 {
     const umb_allocator *a = &index->allocator;
     const umb_committed *c = umb_scene_committed(index->scene);
@@ -243,7 +272,10 @@ static umb_result restore_nodes(umb_index *index, const uint32_t (*refs)[UMB_NOD
         return umb_scene_fail(index->scene, result, "stored nodes make no index");
     }
     umb_bvh_refit(r.nodes, node_count, c);
-    adopt(index, c, r.nodes, node_count, r.item_count);
+    result = adopt(index, c, r.nodes, node_count, r.item_count);
+    if (result != UMB_OK) {
+        return umb_scene_fail(index->scene, result, "no memory to index %u items", r.item_count);
+    }
     return UMB_OK;
 }
 
@@ -300,7 +332,8 @@ umb_result umb_index_create(umb_scene *scene, const umb_index_def *def, umb_inde
 }
 
 umb_result umb_index_restore(umb_scene *scene, const umb_index_def *def,
-                             const uint32_t (*refs)[UMB_NODE_WIDTH], uint32_t node_count, umb_index **out)
+                             const uint32_t (*refs)[UMB_NODE_WIDTH], uint32_t node_count,
+                             umb_index **out)
 {
     *out = NULL;
     umb_index *index = NULL;
@@ -316,7 +349,7 @@ void umb_index_destroy(umb_index *index)
     if (index != NULL) {
         umb_allocator a = index->allocator;
         umb_scene_unlisten(index->scene, &index->listener);
-        umb_memory_free(&a, index->nodes, index->tree.node_count * sizeof(umb_node));
+        drop(index);
         umb_memory_free(&a, index, sizeof(*index));
     }
 }
@@ -365,7 +398,8 @@ void umb_index_get_stats(const umb_index *index, umb_index_stats *out)
     out->nodes = tree->node_count;
     out->depth = tree_depth(tree);
     out->cost = tree_cost(tree);
-    out->bytes = sizeof(*index) + tree->node_count * sizeof(umb_node);
+    out->bytes = sizeof(*index) + tree->node_count * sizeof(umb_node) +
+                 index->object_count * sizeof(index->places[0]);
 }
 
 const char *umb_index_kind_name(umb_index_kind kind)
