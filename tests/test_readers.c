@@ -9,6 +9,7 @@
 
 #include <math.h>
 #include <minizip/zip.h>
+#include <png.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -325,7 +326,8 @@ static int remove_folder(void **state)
 {
     (void)state;
     static const char *const names[] = {"it.obj", "it.mtl", "it.ply", "it.stl", "it.ac", "it.gltf", "it.bin",
-                                        "it.bsp", "it.pk3", "it.glb", "far.obj", "it.city.json", "it.xyz"};
+                                        "it.bsp", "it.pk3", "it.glb", "far.obj", "it.city.json", "it.xyz",
+                                        "holes.png", "full.png", "plain.png", "four.rgb", "three.rgb"};
     for (size_t i = 0; i < sizeof names / sizeof names[0]; ++i) {
         (void)unlink(in_folder(names[i]));
     }
@@ -372,6 +374,43 @@ static void obj_groups_and_materials(void **state)
     assert_int_equal(open_triangles_of(m, 0), 0);
     assert_int_equal(open_triangles_of(m, 1), 1);
     assert_int_equal(triangles_of(m, 2), 1);
+    model_free(m);
+}
+
+static void write_png(const char *name, bool alpha, uint8_t value)
+{
+    uint8_t pixels[16] = {9, 9, 9, 255, 9, 9, 9, value, 9, 9, 9, 255, 9, 9, 9, 255};
+    uint8_t opaque[12] = {0};
+    png_image image = {.version = PNG_IMAGE_VERSION, .width = 2, .height = 2};
+    image.format = alpha ? PNG_FORMAT_RGBA : PNG_FORMAT_RGB;
+    assert_true(png_image_write_to_file(&image, in_folder(name), 0, alpha ? pixels : opaque, 0, NULL));
+}
+
+/* A picture with holes makes its surface open; a full one does not, nor does one that is not there. */
+static void cut_out_textures(void **state)
+{
+    (void)state;
+    write_png("holes.png", true, 0);
+    write_png("full.png", true, 255);
+    write_png("plain.png", false, 0);
+    static const uint8_t sgi[2][12] = {{1, 0xDA, 0, 1, 0, 3, 0, 1, 0, 1, 0, 4}, {1, 0xDA, 0, 1, 0, 3, 0, 1, 0, 1, 0, 3}};
+    write_file("four.rgb", sgi[0], 12);
+    write_file("three.rgb", sgi[1], 12);
+    static const char *const pictures[] = {"holes.png", "full.png", "plain.png", "four.rgb", "three.rgb", "gone.png"};
+    char text[512] = "";
+    for (size_t i = 0; i < 6; ++i) {
+        sprintf(text + strlen(text), "newmtl m%zu\nmap_Kd %s\n", i, pictures[i]);
+    }
+    write_text("it.mtl", text);
+    strcpy(text, "mtllib it.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\n");
+    for (size_t i = 0; i < 6; ++i) {
+        sprintf(text + strlen(text), "o o%zu\nusemtl m%zu\nf 1 2 3\n", i, i);
+    }
+    model *m = load(write_text("it.obj", text));
+    assert_int_equal(m->object_count, 6);
+    for (uint32_t i = 0; i < 6; ++i) {
+        assert_int_equal(open_triangles_of(m, i), i == 0 || i == 3);
+    }
     model_free(m);
 }
 
@@ -604,6 +643,7 @@ int main(void)
         cmocka_unit_test(city_parts),
         cmocka_unit_test(damaged_cities),
         cmocka_unit_test(obj_groups_and_materials),
+        cmocka_unit_test(cut_out_textures),
         cmocka_unit_test(far_obj),
         cmocka_unit_test(gltf_instances),
         cmocka_unit_test(other_formats),

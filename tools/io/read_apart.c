@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -69,11 +70,41 @@ static bool write_model(FILE *to, const model *m, const umb_error *error)
     return written && fflush(to) == 0;
 }
 
-/* The child: silent, leaves no core, and never returns into the parent's clean-up. */
+/* Bytes of address space in use. Sanitizers reserve terabytes, so a limit must count from here. */
+static rlim_t address_space(void)
+{
+    unsigned long pages = 0;
+    FILE *file = fopen("/proc/self/statm", "r");
+    if (file != NULL) {
+        if (fscanf(file, "%lu", &pages) != 1) {
+            pages = 0;
+        }
+        fclose(file);
+    }
+    return (rlim_t)pages * (rlim_t)sysconf(_SC_PAGESIZE);
+}
+
+/* Damaged files can also make the importer run for ever or ask for all memory. What it gets is far more
+ * than honest files of that size take. */
+static void limit_child(const char *path)
+{
+    struct stat status;
+    rlim_t size = stat(path, &status) == 0 && status.st_size > 0 ? (rlim_t)status.st_size : 0;
+    struct rlimit core = {0, 0};
+    struct rlimit seconds = {3 + size / 50000, 3 + size / 50000};
+    struct rlimit memory = {address_space(), RLIM_INFINITY};
+    setrlimit(RLIMIT_CORE, &core);
+    setrlimit(RLIMIT_CPU, &seconds);
+    if (memory.rlim_cur != 0) {
+        memory.rlim_cur += ((rlim_t)2 << 30) + 256 * size;
+        setrlimit(RLIMIT_AS, &memory);
+    }
+}
+
+/* The child: silent, limited, and never returns into the parent's clean-up. */
 static void be_child(int pipe_end, read_function *read, const char *path)
 {
-    const struct rlimit none = {0, 0};
-    setrlimit(RLIMIT_CORE, &none);
+    limit_child(path);
     int quiet = open("/dev/null", O_WRONLY);
     if (quiet >= 0) {
         dup2(quiet, STDOUT_FILENO);
@@ -176,8 +207,8 @@ model *read_apart(read_function *read, const char *path, umb_error *error)
         return read(path, error);
     }
     umb_error told;
-    model_fail(&told, UMB_ERROR_FORMAT, "%s: the importer crashed on it; the file is damaged, export it again",
-               path);
+    model_fail(&told, UMB_ERROR_FORMAT,
+               "%s: the importer crashed or found no end; the file is damaged, export it again", path);
     model *m = from != NULL ? read_model(from, &told) : NULL;
     if (m == NULL && error != NULL) {
         *error = told;

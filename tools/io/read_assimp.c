@@ -16,6 +16,7 @@
 #include "model_parts.h"
 #include "read_apart.h"
 #include "readers.h"
+#include "texture_alpha.h"
 
 /* A node's transform to the world, accumulated in double. */
 typedef struct placement {
@@ -25,6 +26,8 @@ typedef struct placement {
 typedef struct assimp_reader {
     const struct aiScene *scene;
     model *into;
+    const char *path;
+    texture_alphas alphas;
     uint32_t *mesh_of; /* importer's mesh -> model's mesh, MODEL_NONE without triangles, UNREAD */
     bool cards;        /* the format has no word for alpha testing: names of trees tell */
 } assimp_reader;
@@ -55,21 +58,24 @@ static float material_number(const struct aiMaterial *material, const char *key,
     return value;
 }
 
-/* Cut-out trees: the texture's name, where the importer kept it. */
-static bool has_tree_texture(const struct aiMaterial *material)
+/* Whether the picture on a surface is cut out: it has pixels that are not opaque or, for trees of AC3D
+ * scenes, a name that tells. */
+static bool has_cut_out_texture(assimp_reader *r, const struct aiMaterial *material)
 {
-    struct aiString path;
-    if (aiGetMaterialTexture(material, aiTextureType_DIFFUSE, 0, &path, NULL, NULL, NULL, NULL, NULL,
+    struct aiString texture;
+    if (aiGetMaterialTexture(material, aiTextureType_DIFFUSE, 0, &texture, NULL, NULL, NULL, NULL, NULL,
                              NULL) != aiReturn_SUCCESS) {
         return false;
     }
-    const char *slash = strrchr(path.data, '/');
-    return strncasecmp(slash != NULL ? slash + 1 : path.data, "tree", 4) == 0;
+    const char *slash = strrchr(texture.data, '/');
+    return (r->cards && strncasecmp(slash != NULL ? slash + 1 : texture.data, "tree", 4) == 0) ||
+           texture_has_alpha(&r->alphas, r->path, texture.data);
 }
 
-/* What the material says about hiding. glTF says it plainly; elsewhere an opacity below one, or a map
- * of opacity, means that one may see through. Nothing said means opaque and one-sided. */
-static uint8_t material_flags(const struct aiMaterial *material, bool cards)
+/* What the material says about hiding. glTF says it plainly; elsewhere an opacity below one, a map of
+ * opacity, or a picture with holes means that one may see through. Nothing said means opaque and
+ * one-sided. */
+static uint8_t material_flags(assimp_reader *r, const struct aiMaterial *material)
 {
     uint8_t flags = 0;
     struct aiString mode;
@@ -78,11 +84,11 @@ static uint8_t material_flags(const struct aiMaterial *material, bool cards)
         flags |= UMB_TRIANGLE_OPEN;
     }
     if (!gltf && (!(material_number(material, "$mat.opacity", 1.0f) >= 1.0f) ||
-                  aiGetMaterialTextureCount(material, aiTextureType_OPACITY) != 0)) {
+                  aiGetMaterialTextureCount(material, aiTextureType_OPACITY) != 0 ||
+                  has_cut_out_texture(r, material))) {
         flags |= UMB_TRIANGLE_OPEN;
     }
-    if (material_number(material, "$mat.transmission.factor", 0.0f) > 0.0f ||
-        (cards && has_tree_texture(material))) {
+    if (material_number(material, "$mat.transmission.factor", 0.0f) > 0.0f) {
         flags |= UMB_TRIANGLE_OPEN;
     }
     int two_sided = 0;
@@ -100,7 +106,7 @@ static bool read_mesh(assimp_reader *r, unsigned number, bool open)
     const struct aiMesh *from = r->scene->mMeshes[number];
     const struct aiMaterial *material =
         from->mMaterialIndex < r->scene->mNumMaterials ? r->scene->mMaterials[from->mMaterialIndex] : NULL;
-    uint8_t flags = material != NULL ? material_flags(material, r->cards) : 0;
+    uint8_t flags = material != NULL ? material_flags(r, material) : 0;
     flags |= open ? UMB_TRIANGLE_OPEN : 0;
     size_t faces = from->mVertices != NULL ? from->mNumFaces : 0;
     model_mesh mesh = {
@@ -169,6 +175,7 @@ static bool read_scene(assimp_reader *r)
     }
     bool read = r->scene->mRootNode == NULL || read_node(r, r->scene->mRootNode, &identity);
     free(r->mesh_of);
+    texture_alphas_free(&r->alphas);
     return read;
 }
 
@@ -180,7 +187,9 @@ static model *import(const char *path, umb_error *error)
     if (!import_files_open(&files, path, origin, error)) {
         return NULL;
     }
-    assimp_reader r = {.scene = aiImportFileEx(path, aiProcess_Triangulate, &files.io), .into = model_create()};
+    assimp_reader r = {.scene = aiImportFileEx(path, aiProcess_Triangulate, &files.io),
+                       .into = model_create(),
+                       .path = path};
     import_files_close(&files);
     r.cards = input_ends_with(path, ".ac") || input_ends_with(path, ".acc");
     bool read = false;
