@@ -1,35 +1,35 @@
-/* A plain binary tree over the objects' boxes, for walks of exact segments. */
+/* A plain binary tree over boxes of a few triangles each, for walks of exact segments. */
 #include <math.h>
 #include <stdlib.h>
 
 #include "oracle.h"
 
-#define LEAF_OBJECTS 4u
+#define LEAF_CHUNKS 2u
+#define CHUNK_TRIANGLES 16u
+#define MOST_CHUNKS 2000000u /* scenes of more triangles get longer chunks */
 
-static double centre(const truth *t, uint32_t object, int axis)
+static double centre(const oracle_chunk *chunk, int axis)
 {
-    const umb_aabb *box = &t->model->objects[object].bounds;
-    return (double)box->min[axis] + box->max[axis];
+    return (double)chunk->box.min[axis] + chunk->box.max[axis];
 }
 
 /* Order [first, last) so that what lies before `middle` is not above what lies behind (quickselect). */
-static void part_at(const truth *t, uint32_t *order, uint32_t first, uint32_t last, uint32_t middle,
-                    int axis)
+static void part_at(oracle_chunk *order, uint32_t first, uint32_t last, uint32_t middle, int axis)
 {
     while (last - first > 1) {
-        double pivot = centre(t, order[first + (last - first) / 2], axis);
+        double pivot = centre(&order[first + (last - first) / 2], axis);
         uint32_t i = first, j = last - 1;
         for (;;) {
-            while (centre(t, order[i], axis) < pivot) {
+            while (centre(&order[i], axis) < pivot) {
                 ++i;
             }
-            while (centre(t, order[j], axis) > pivot) {
+            while (centre(&order[j], axis) > pivot) {
                 --j;
             }
             if (i >= j) {
                 break;
             }
-            uint32_t swap = order[i];
+            oracle_chunk swap = order[i];
             order[i++] = order[j];
             order[j--] = swap;
         }
@@ -45,25 +45,25 @@ static void part_at(const truth *t, uint32_t *order, uint32_t first, uint32_t la
     }
 }
 
-static umb_aabb box_around(const truth *t, uint32_t first, uint32_t last)
+static void grow_box(umb_aabb *box, const float min[3], const float max[3])
 {
-    umb_aabb box = t->model->objects[t->order[first]].bounds;
-    for (uint32_t i = first + 1; i < last; ++i) {
-        const umb_aabb *b = &t->model->objects[t->order[i]].bounds;
-        for (int k = 0; k < 3; ++k) {
-            box.min[k] = fminf(box.min[k], b->min[k]);
-            box.max[k] = fmaxf(box.max[k], b->max[k]);
-        }
+    for (int k = 0; k < 3; ++k) {
+        box->min[k] = fminf(box->min[k], min[k]);
+        box->max[k] = fmaxf(box->max[k], max[k]);
     }
-    return box;
 }
+
+static const umb_aabb empty_box = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
 
 /* The tree is implicit: a node is a range, halved at its middle; boxes lie in the order of a walk. */
 static void build(truth *t, uint32_t first, uint32_t last, uint32_t *used)
 {
     oracle_box_node *node = &t->box_nodes[(*used)++];
-    node->box = box_around(t, first, last);
-    if (last - first > LEAF_OBJECTS) {
+    node->box = empty_box;
+    for (uint32_t i = first; i < last; ++i) {
+        grow_box(&node->box, t->chunks[i].box.min, t->chunks[i].box.max);
+    }
+    if (last - first > LEAF_CHUNKS) {
         int axis = 0;
         for (int k = 1; k < 3; ++k) {
             if (node->box.max[k] - node->box.min[k] > node->box.max[axis] - node->box.min[axis]) {
@@ -71,30 +71,51 @@ static void build(truth *t, uint32_t first, uint32_t last, uint32_t *used)
             }
         }
         uint32_t middle = first + (last - first) / 2;
-        part_at(t, t->order, first, last, middle, axis);
+        part_at(t->chunks, first, last, middle, axis);
         build(t, first, middle, used);
         build(t, middle, last, used);
     }
     node->after = *used;
 }
 
+static void chunk_object(truth *t, uint32_t object, uint32_t length)
+{
+    uint32_t count = t->model->meshes[t->model->objects[object].mesh].triangle_count;
+    for (uint32_t first = 0; first < count; first += length) {
+        oracle_chunk *chunk = &t->chunks[t->chunk_count++];
+        *chunk = (oracle_chunk){empty_box, object, first,
+                                first + length < count ? first + length : count};
+        for (uint32_t k = first; k < chunk->last; ++k) {
+            float v[3][3];
+            oracle_triangle(t, object, k, v);
+            for (int i = 0; i < 3; ++i) {
+                grow_box(&chunk->box, v[i], v[i]);
+            }
+        }
+    }
+}
+
 bool oracle_boxes_build(truth *t)
 {
     const model *m = t->model;
     uint32_t used = 0;
-    t->order = malloc(((size_t)m->object_count + 1) * sizeof(*t->order));
-    t->box_nodes = malloc(2 * ((size_t)m->object_count + 1) * sizeof(*t->box_nodes));
-    if (!t->order || !t->box_nodes) {
+    uint64_t triangles = t->first_triangle[m->object_count], chunks = 0;
+    uint64_t length = CHUNK_TRIANGLES + triangles / MOST_CHUNKS;
+    for (uint32_t i = 0; i < m->object_count; ++i) {
+        chunks += (t->first_triangle[i + 1] - t->first_triangle[i] + length - 1) / length;
+    }
+    t->chunks = malloc((size_t)(chunks + 1) * sizeof(*t->chunks));
+    t->box_nodes = malloc(2 * (size_t)(chunks + 1) * sizeof(*t->box_nodes));
+    if (!t->chunks || !t->box_nodes || chunks > UINT32_MAX / 2) {
         return false;
     }
-    t->order_count = 0;
     for (uint32_t i = 0; i < m->object_count; ++i) {
         if (m->objects[i].mesh != MODEL_NONE) {
-            t->order[t->order_count++] = i;
+            chunk_object(t, i, (uint32_t)length);
         }
     }
-    if (t->order_count) {
-        build(t, 0, t->order_count, &used);
+    if (t->chunk_count) {
+        build(t, 0, t->chunk_count, &used);
     }
     return true;
 }
@@ -122,33 +143,38 @@ static bool segment_meets_box(const double from[3], const double to[3], const um
     return low <= high + 1e-9;
 }
 
-static bool walk(const truth *t, const double from[3], const double to[3], uint32_t *node,
-                 uint32_t first, uint32_t last, bool (*visit)(void *user, uint32_t object),
-                 void *user)
+typedef struct box_walk {
+    const truth *t;
+    const double *from, *to;
+    oracle_visit *visit;
+    void *user;
+    uint32_t node;
+} box_walk;
+
+static bool walk(box_walk *w, uint32_t first, uint32_t last)
 {
-    const oracle_box_node *n = &t->box_nodes[*node];
-    if (!segment_meets_box(from, to, &n->box)) {
-        *node = n->after;
+    const oracle_box_node *n = &w->t->box_nodes[w->node];
+    if (!segment_meets_box(w->from, w->to, &n->box)) {
+        w->node = n->after;
         return true;
     }
-    ++*node;
-    if (last - first > LEAF_OBJECTS) {
+    ++w->node;
+    if (last - first > LEAF_CHUNKS) {
         uint32_t middle = first + (last - first) / 2;
-        return walk(t, from, to, node, first, middle, visit, user) &&
-               walk(t, from, to, node, middle, last, visit, user);
+        return walk(w, first, middle) && walk(w, middle, last);
     }
     for (uint32_t i = first; i < last; ++i) {
-        uint32_t object = t->order[i];
-        if (segment_meets_box(from, to, &t->model->objects[object].bounds) && !visit(user, object)) {
+        const oracle_chunk *chunk = &w->t->chunks[i];
+        if (segment_meets_box(w->from, w->to, &chunk->box) && !w->visit(w->user, chunk)) {
             return false;
         }
     }
     return true;
 }
 
-bool oracle_boxes_walk(const truth *t, const double from[3], const double to[3],
-                       bool (*visit)(void *user, uint32_t object), void *user)
+bool oracle_boxes_walk(const truth *t, const double from[3], const double to[3], oracle_visit *visit,
+                       void *user)
 {
-    uint32_t node = 0;
-    return t->order_count == 0 || walk(t, from, to, &node, 0, t->order_count, visit, user);
+    box_walk w = {.t = t, .from = from, .to = to, .visit = visit, .user = user};
+    return t->chunk_count == 0 || walk(&w, 0, t->chunk_count);
 }

@@ -2,7 +2,7 @@
  *
  * The line is the one through the eye and a given double point (orthographic: through the point, along
  * forward), and nothing about it is rounded: which of the object's triangles it crosses, whether that
- * is inside the view, and which triangles it touches before, are signs of exact sums. Boxes of objects
+ * is inside the view, and which triangles it touches before, are signs of exact sums. Boxes of triangles
  * are passed over in double, with room for its rounding; that can only add triangles to look at.
  *
  * Wherever a case is left open (a line in a blocker's plane, a number too long) the answer is "not
@@ -29,8 +29,9 @@ typedef struct confirmation {
     oracle_sight sight;
     linear beyond_near;
     exact_crossing target;
+    uint32_t object;
     uint8_t renderer;
-    bool lost;
+    bool found, lost;
 } confirmation;
 
 static bool in_range3(const double p[3])
@@ -139,27 +140,35 @@ static bool reach(confirmation *c, float v[3][3], exact_crossing *at)
 }
 
 /* The nearest point of the object on the line that the renderer shows and the view holds. */
-static bool find_target(confirmation *c, uint32_t object)
+static bool aim_at_chunk(void *user, const oracle_chunk *chunk)
 {
-    const model_object *o = &c->t->model->objects[object];
-    uint32_t count = o->mesh != MODEL_NONE ? c->t->model->meshes[o->mesh].triangle_count : 0;
-    bool found = false;
-    for (uint32_t i = 0; i < count; ++i) {
+    confirmation *c = user;
+    for (uint32_t i = chunk->first; chunk->object == c->object && i < chunk->last; ++i) {
         float v[3][3];
         exact_crossing at;
-        oracle_triangle(c->t, object, i, v);
+        oracle_triangle(c->t, c->object, i, v);
         if (!reach(c, v, &at)) {
             continue;
         }
-        if (c->renderer == TRUTH_CULLING && !oracle_shown(oracle_flags(c->t, object, i), at.facing)) {
+        if (c->renderer == TRUTH_CULLING &&
+            !oracle_shown(oracle_flags(c->t, c->object, i), at.facing)) {
             continue;
         }
-        if ((!found || exact_compare(&at, &c->target, &c->lost) < 0) && in_view(c, &at)) {
+        if ((!c->found || exact_compare(&at, &c->target, &c->lost) < 0) && in_view(c, &at)) {
             c->target = at;
-            found = true;
+            c->found = true;
         }
     }
-    return found && !c->lost;
+    return true;
+}
+
+static bool find_target(confirmation *c)
+{
+    double end[3];
+    double length = c->v->far_depth - c->v->view->near_depth;
+    oracle_sight_at(&c->sight, length + 1e-6 * fabs(length), end);
+    oracle_boxes_walk(c->t, c->sight.from, end, aim_at_chunk, c);
+    return c->found && !c->lost;
 }
 
 static bool all_nearer_than_near(confirmation *c, float v[3][3])
@@ -204,13 +213,11 @@ static bool blocks(confirmation *c, uint32_t object, uint32_t triangle)
            exact_compare(&at, &c->target, &c->lost) < 0;
 }
 
-static bool passes_object(void *user, uint32_t object)
+static bool passes_chunk(void *user, const oracle_chunk *chunk)
 {
     confirmation *c = user;
-    const model *m = c->t->model;
-    uint32_t count = m->meshes[m->objects[object].mesh].triangle_count;
-    for (uint32_t k = 0; k < count; ++k) {
-        if (blocks(c, object, k) || c->lost) {
+    for (uint32_t k = chunk->first; k < chunk->last; ++k) {
+        if (blocks(c, chunk->object, k) || c->lost) {
             return false;
         }
     }
@@ -221,7 +228,7 @@ bool oracle_confirm(const truth *t, const oracle_view *v, const double through[3
                     uint8_t renderer, truth_witness *out)
 {
     const umb_view *view = v->view;
-    confirmation c = {.t = t, .v = v, .through = through, .renderer = renderer};
+    confirmation c = {.t = t, .v = v, .through = through, .object = object, .renderer = renderer};
     if (!view_in_range(view) || !in_range3(through) || !oracle_sight_make(v, through, &c.sight)) {
         return false;
     }
@@ -231,7 +238,7 @@ bool oracle_confirm(const truth *t, const oracle_view *v, const double through[3
         exact_line_along(&c.line, through, view->forward);
     }
     make_linear(&c.line, view->eye, view->forward, view->near_depth, &c.beyond_near);
-    if (exact_sign(&c.beyond_near.slope, &c.lost) <= 0 || !find_target(&c, object)) {
+    if (exact_sign(&c.beyond_near.slope, &c.lost) <= 0 || !find_target(&c)) {
         return false;
     }
     double s = exact_estimate(&c.target.numerator) / exact_estimate(&c.target.denominator);
@@ -240,7 +247,7 @@ bool oracle_confirm(const truth *t, const oracle_view *v, const double through[3
         w.from[i] = c.sight.from[i];
         w.to[i] = c.line.origin[i] + s * c.line.approximate[i];
     }
-    if (!oracle_boxes_walk(t, w.from, w.to, passes_object, &c) || c.lost) {
+    if (!oracle_boxes_walk(t, w.from, w.to, passes_chunk, &c) || c.lost) {
         return false;
     }
     *out = w;

@@ -16,8 +16,14 @@ typedef struct oracle_part {
 /* Geometry numbers: how a triangle blocks. */
 enum { PART_BOTH_SIDES = 0, PART_ONE_SIDE = 1, PART_OPEN = 2, PART_KINDS = 3 };
 
-/* A node of the tree over objects' boxes, in the order of a walk; after: the node to go on with when
- * this one is passed over. */
+/* Triangles [first, last) of an object and the box around them. */
+typedef struct oracle_chunk {
+    umb_aabb box;
+    uint32_t object, first, last;
+} oracle_chunk;
+
+/* A node of the tree over chunks, in the order of a walk; after: the node to go on with when this one is
+ * passed over. */
 typedef struct oracle_box_node {
     umb_aabb box;
     uint32_t after;
@@ -37,8 +43,8 @@ struct truth {
     oracle_part (*mesh_parts)[PART_KINDS]; /* instanced: per mesh */
     RTCScene *mesh_scenes;
     uint32_t **neighbours;    /* per mesh, three per triangle, made when first needed */
-    uint32_t *order;          /* objects with triangles, in the order of the tree's leaves */
-    uint32_t order_count;
+    oracle_chunk *chunks;     /* in the order of the tree's leaves */
+    uint32_t chunk_count;
     oracle_box_node *box_nodes;
 };
 
@@ -58,12 +64,13 @@ uint8_t oracle_flags(const truth *t, uint32_t object, uint32_t triangle);
  * there is no single one. NULL when memory is short. Not safe from two threads at once. */
 const uint32_t *oracle_neighbours(truth *t, uint32_t mesh);
 
-/* The tree over objects' boxes (boxes.c). */
+/* The tree over chunks (boxes.c). */
 bool oracle_boxes_build(truth *t);
-/* Visit every object whose box the segment touches, until visit returns false; returns whether all were
+typedef bool oracle_visit(void *user, const oracle_chunk *chunk);
+/* Visit every chunk whose box the segment touches, until visit returns false; returns whether all were
  * visited. */
-bool oracle_boxes_walk(const truth *t, const double from[3], const double to[3],
-                       bool (*visit)(void *user, uint32_t object), void *user);
+bool oracle_boxes_walk(const truth *t, const double from[3], const double to[3], oracle_visit *visit,
+                       void *user);
 
 /* A view as half-spaces, and how far anything can be. */
 typedef struct oracle_view {

@@ -303,7 +303,8 @@ truth *oracle_create(const model *m, oracle_form form, umb_error *error)
     if (t) {
         t->model = m;
     }
-    if (t && prepare(t, form) && oracle_boxes_build(t) && (t->flat ? build_flat(t) : build_instances(t))) {
+    if (t && prepare(t, form) && (t->flat ? build_flat(t) : build_instances(t)) &&
+        oracle_boxes_build(t)) {
         return t;
     }
     if (error) {
@@ -346,7 +347,7 @@ void truth_destroy(truth *t)
     free(t->mesh_scenes);
     free(t->mesh_parts);
     free(t->neighbours);
-    free(t->order);
+    free(t->chunks);
     free(t->box_nodes);
     free(t->vertices);
     free(t->first_vertex);
