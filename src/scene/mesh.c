@@ -214,8 +214,8 @@ static umb_mesh *pack(const umb_allocator *allocator, const mesh_builder *b, con
     memcpy(m->two_sided, b->two_sided, b->blocking_count * sizeof *m->two_sided);
     memcpy(m->edges, edges, edge_count * sizeof *m->edges);
     memcpy(m->parts, parts, part_count * sizeof *m->parts);
-    if (b->triangle_count > 0) {
-        memcpy(m->part_order, part_order, b->triangle_count * sizeof *m->part_order);
+    for (uint32_t t = 0; t < m->seen_count; ++t) {
+        m->part_order[t] = part_order != NULL ? part_order[t] : t;
     }
     for (uint32_t t = 0; t < m->triangle_count; ++t) {
         m->any_two_sided |= m->two_sided[t];
@@ -225,7 +225,7 @@ static umb_mesh *pack(const umb_allocator *allocator, const mesh_builder *b, con
     return m;
 }
 
-umb_result umb_mesh_create(const umb_allocator *allocator, const umb_shape_def *def, umb_mesh **out)
+static umb_result create(const umb_allocator *allocator, const umb_shape_def *def, bool one_part, umb_mesh **out)
 {
     *out = NULL;
     umb_result result = check_def(def);
@@ -246,10 +246,11 @@ umb_result umb_mesh_create(const umb_allocator *allocator, const umb_shape_def *
         const uint32_t(*triangles)[3] = (const uint32_t(*)[3])b.triangles;
         umb_edge *edges =
             umb_mesh_edges_build(&scratch, triangles, b.two_sided, b.blocking_count, &edge_count);
-        umb_part whole = {bounds_of((const float(*)[3])b.positions, b.position_count), 1, 0, 0};
+        umb_part whole = {bounds_of((const float(*)[3])b.positions, b.position_count), 1, 0,
+                          b.triangle_count};
         const umb_part *parts = &whole;
         const uint32_t *part_order = NULL;
-        if (b.triangle_count > 0) {
+        if (b.triangle_count > 0 && !one_part) {
             parts = umb_mesh_parts_build(&scratch, (const float(*)[3])b.positions, triangles,
                                          b.triangle_count, &part_count, &part_order);
         }
@@ -259,6 +260,16 @@ umb_result umb_mesh_create(const umb_allocator *allocator, const umb_shape_def *
     }
     umb_scratch_free(&scratch);
     return *out != NULL ? UMB_OK : UMB_ERROR_MEMORY;
+}
+
+umb_result umb_mesh_create(const umb_allocator *allocator, const umb_shape_def *def, umb_mesh **out)
+{
+    return create(allocator, def, false, out);
+}
+
+umb_result umb_mesh_create_occluder(const umb_allocator *allocator, const umb_shape_def *def, umb_mesh **out)
+{
+    return create(allocator, def, true, out);
 }
 
 void umb_mesh_destroy(const umb_allocator *allocator, umb_mesh *mesh)

@@ -45,6 +45,8 @@ typedef struct umb_mesh {
  * vertices for normals and colours, and a split is no crack. Positions no triangle uses are left out
  * (unless there is no triangle at all). Errors: the rules of umb_shape_def, no memory. */
 umb_result umb_mesh_create(const umb_allocator *allocator, const umb_shape_def *def, umb_mesh **out);
+/* The same with a single part: for occluders that stand alone, which have no object's bounds to refine. */
+umb_result umb_mesh_create_occluder(const umb_allocator *allocator, const umb_shape_def *def, umb_mesh **out);
 void umb_mesh_destroy(const umb_allocator *allocator, umb_mesh *mesh);
 
 /* Lay out the arrays of an empty mesh in one block, for those who fill it in themselves: the counts of

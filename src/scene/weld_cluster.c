@@ -324,7 +324,7 @@ static void make_mesh(void *data, uint32_t k)
                              .indices = indices,
                              .index_count = 3 * n,
                              .triangle_flags = flags};
-        (void)umb_mesh_create(task->allocator, &def, &task->meshes[k]);
+        (void)umb_mesh_create_occluder(task->allocator, &def, &task->meshes[k]);
     }
     umb_scratch_free(&scratch);
 }
