@@ -141,8 +141,8 @@ static void random_point(int p[3], int size)
     }
 }
 
-/* Small numbers make touching, edge-on and degenerate cases common. Scaling by a power of two and moving
- * by a large offset changes no answer, but makes plain double arithmetic fail. */
+/* Small numbers make touching, edge-on and degenerate cases common. Scaling by a power of two
+ * and moving by a large offset changes no answer, but makes plain double arithmetic fail. */
 static void test_lines_and_triangles(void **state)
 {
     (void)state;
@@ -234,7 +234,8 @@ static void test_lines_in_a_plane(void **state)
             }
             if (sa * sb < 0.0) {
                 /* Where a + u (b - a) meets the line, u = sa / (sa - sb). */
-                double at = (ax * (sa - sb) + sa * (bx - ax)) * dx + (ay * (sa - sb) + sa * (by - ay)) * dy;
+                double at = (ax * (sa - sb) + sa * (bx - ax)) * dx +
+                            (ay * (sa - sb) + sa * (by - ay)) * dy;
                 touches |= sa - sb > 0.0 ? at < length * (sa - sb) : at > length * (sa - sb);
             }
         }
@@ -263,7 +264,7 @@ static void test_degenerate(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_sums_and_products), cmocka_unit_test(test_tiny_beside_huge),
+        cmocka_unit_test(test_sums_and_products),   cmocka_unit_test(test_tiny_beside_huge),
         cmocka_unit_test(test_lines_and_triangles), cmocka_unit_test(test_lines_in_a_plane),
         cmocka_unit_test(test_degenerate),
     };

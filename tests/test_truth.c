@@ -14,8 +14,8 @@
 
 enum { NEITHER = 0, CULLING = TRUTH_CULLING, BOTH_SIDES = TRUTH_TWO_SIDED, EVERY = 3 };
 
-static uint32_t add_mesh(model *m, const float *positions, uint32_t vertices, const uint32_t *indices,
-                         uint32_t triangles, uint8_t flags)
+static uint32_t add_mesh(model *m, const float *positions, uint32_t vertices,
+                         const uint32_t *indices, uint32_t triangles, uint8_t flags)
 {
     uint8_t *f = malloc(triangles);
     assert_non_null(f);
@@ -31,7 +31,8 @@ static uint32_t add_mesh(model *m, const float *positions, uint32_t vertices, co
     return number;
 }
 
-/* An upright rectangle at depth z (the eye looks along -z from the origin), its front towards +z. */
+/* An upright rectangle at depth z (the eye looks along -z from the origin), its front towards
+ * +z. */
 static uint32_t add_wall(model *m, float x0, float x1, float y0, float y1, float z, uint8_t flags)
 {
     const float p[12] = {x0, y0, z, x1, y0, z, x1, y1, z, x0, y1, z};
@@ -76,7 +77,8 @@ static truth_result look(const model *m, const umb_view *view, oracle_form form,
     memset(accused, 1, m->object_count + 1);
     truth *t = oracle_create(m, form, &error);
     assert_non_null(t);
-    truth_options options = {.grid_width = 64, .grid_height = 64, .accused = accused, .threads = threads};
+    truth_options options = {
+        .grid_width = 64, .grid_height = 64, .accused = accused, .threads = threads};
     truth_result r;
     assert_true(truth_view(t, view, &options, &r, &error));
     truth_destroy(t);
@@ -193,7 +195,8 @@ static void test_near_and_far(void **state)
     expect(m, &cut, (int[]){NEITHER, EVERY, NEITHER});
     expect(m, &whole, (int[]){EVERY, NEITHER, NEITHER});
     expect(m, &at, (int[]){EVERY, NEITHER, NEITHER}); /* a wall in the near plane counts */
-    umb_view deep = make_view(1.0, INFINITY), touching = make_view(1.0, 9.0), short_of = make_view(1.0, 8.999);
+    umb_view deep = make_view(1.0, INFINITY), touching = make_view(1.0, 9.0),
+             short_of = make_view(1.0, 8.999);
     expect(m, &deep, (int[]){NEITHER, EVERY, EVERY});
     expect(m, &touching, (int[]){NEITHER, EVERY, NEITHER}); /* the frustum is closed */
     expect_and_free(m, &short_of, (int[]){NEITHER, NEITHER, NEITHER});
@@ -227,11 +230,11 @@ static void test_orthographic(void **state)
     const double eye[3] = {0, 0, 0}, target[3] = {0, 0, -1}, up[3] = {0, 1, 0};
     assert_int_equal(umb_view_look_at_ortho(&v, eye, target, up, 20.0, 1.0, -5.0, 50.0), UMB_OK);
     add_wall(m, -2, 2, -2, 2, -5, 0);
-    add_box(m, 0, 0, -10, 1.9f);  /* hidden though a pinhole eye further back would see round */
+    add_box(m, 0, 0, -10, 1.9f); /* hidden though a pinhole eye further back would see round */
     add_box(m, 5, 0, -10, 1);
-    add_box(m, 0, 0, 4, 0.5f);    /* behind the eye, but beyond the near plane */
-    add_box(m, 0, 0, -10, 2.0f);  /* flush with the wall's outline */
-    add_box(m, 0, 30, -10, 1);    /* beside the picture */
+    add_box(m, 0, 0, 4, 0.5f);   /* behind the eye, but beyond the near plane */
+    add_box(m, 0, 0, -10, 2.0f); /* flush with the wall's outline */
+    add_box(m, 0, 30, -10, 1);   /* beside the picture */
     finish(m);
     int *expected = (int[]){EVERY, NEITHER, EVERY, EVERY, NEITHER, NEITHER};
     expect_and_free(m, &v, expected);
@@ -240,8 +243,8 @@ static void test_orthographic(void **state)
 static void test_shared_edges_do_not_leak(void **state)
 {
     (void)state;
-    /* A fan of triangles about a point on no nice coordinate, and a wall cut by a T-junction: exact, since
-     * the middle of the edge is a float. */
+    /* A fan of triangles about a point on no nice coordinate, and a wall cut by a T-junction:
+     * exact, since the middle of the edge is a float. */
     model *m = model_create();
     umb_view v = make_view(0.1, 100.0);
     const float c[3] = {0.1234567f, -0.7654321f, -5.0f};
@@ -258,7 +261,8 @@ static void test_shared_edges_do_not_leak(void **state)
     }
     model_add_object(m, "fan", add_mesh(m, p, 17, i, 16, 0), NULL);
     add_box(m, 0, 0, -15, 3);
-    const float q[15] = {-90, -60, -30, 0.75f, -60, -31, 2.25f, 60, -27, -90, 60, -30, 1.5f, 0, -29};
+    const float q[15] = {-90, -60, -30, 0.75f, -60,  -31, 2.25f, 60,
+                         -27, -90, 60,  -30,   1.5f, 0,   -29};
     const float far_side[12] = {1.5f, 0, -29, 0.75f, -60, -31, 90, -60, -30, 2.25f, 60, -27};
     const uint32_t left[6] = {0, 1, 2, 0, 2, 3}, right[9] = {0, 1, 2, 0, 2, 4, 0, 4, 3};
     float r[15];
@@ -418,8 +422,10 @@ static model *random_scene(uint32_t objects)
         int size = 1 + random_below(6), depth = 2 + random_below(20);
         int x = random_below(17) - 8, y = random_below(17) - 8;
         for (int c = 0; c < 6; ++c) {
-            p[3 * c] = (float)(x * depth) / 10.0f + 0.25f * (float)(random_below(8 * size) - 4 * size);
-            p[3 * c + 1] = (float)(y * depth) / 10.0f + 0.25f * (float)(random_below(8 * size) - 4 * size);
+            p[3 * c] = (float)(x * depth) / 10.0f +
+                       0.25f * (float)(random_below(8 * size) - 4 * size);
+            p[3 * c + 1] = (float)(y * depth) / 10.0f +
+                           0.25f * (float)(random_below(8 * size) - 4 * size);
             p[3 * c + 2] = -0.5f * (float)(depth + random_below(4));
         }
         for (uint32_t c = 0; c < 3 * triangles; ++c) {
@@ -453,15 +459,16 @@ static void test_threads_do_not_matter(void **state)
     model_free(m);
 }
 
-/* The slow tracer: every triangle, in long double. How it meets the segment from + s (to - from). */
+/* The slow tracer: every triangle, in long double. How it meets the segment from + s (to -
+ * from). */
 typedef struct slow_hit {
-    bool touches;      /* within the rounding, perhaps */
-    bool surely;       /* well inside the triangle */
+    bool touches; /* within the rounding, perhaps */
+    bool surely;  /* well inside the triangle */
     long double s, facing;
 } slow_hit;
 
-static slow_hit meet_slowly(const truth *t, uint32_t object, uint32_t triangle, const double from[3],
-                            const double to[3])
+static slow_hit meet_slowly(const truth *t, uint32_t object, uint32_t triangle,
+                            const double from[3], const double to[3])
 {
     float v[3][3];
     long double e[3], f[3], n[3], d[3], o[3], numerator = 0, denominator = 0, lowest = INFINITY;
@@ -490,7 +497,8 @@ static slow_hit meet_slowly(const truth *t, uint32_t object, uint32_t triangle, 
             int a = (i + 1) % 3, b = (i + 2) % 3;
             long double side_a = (long double)v[(k + 1) % 3][a] - v[k][a];
             long double side_b = (long double)v[(k + 1) % 3][b] - v[k][b];
-            long double to_a = from[a] + hit.s * d[a] - v[k][a], to_b = from[b] + hit.s * d[b] - v[k][b];
+            long double to_a = from[a] + hit.s * d[a] - v[k][a],
+                        to_b = from[b] + hit.s * d[b] - v[k][b];
             inside += n[i] * (side_a * to_b - side_b * to_a);
         }
         lowest = fminl(lowest, inside / (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]));
@@ -518,7 +526,8 @@ static void check_witness(const truth *t, uint32_t object, const truth_witness *
             if (hit.surely && hit.s > 1e-9L && hit.s < 1.0L - 1e-9L) {
                 assert_false(stops(mesh->flags[k], hit.facing, renderer));
             }
-            arrives |= i == object && ((hit.touches && fabsl(hit.s - 1.0L) < 1e-7L) || hit.facing == 0);
+            arrives |= i == object &&
+                       ((hit.touches && fabsl(hit.s - 1.0L) < 1e-7L) || hit.facing == 0);
         }
     }
     assert_true(arrives);
@@ -536,7 +545,8 @@ static uint32_t check_ray(const truth *t, const truth_result *r, const double fr
         const model_mesh *mesh = &m->meshes[m->objects[i].mesh];
         for (uint32_t k = 0; k < mesh->triangle_count; ++k) {
             slow_hit hit = meet_slowly(t, i, k, from, to);
-            if (!hit.touches || hit.s < 0.0L || hit.s > 1.0L || !stops(mesh->flags[k], hit.facing, renderer)) {
+            if (!hit.touches || hit.s < 0.0L || hit.s > 1.0L ||
+                !stops(mesh->flags[k], hit.facing, renderer)) {
                 continue;
             }
             nearest = fminl(nearest, hit.s);
@@ -552,7 +562,8 @@ static uint32_t check_ray(const truth *t, const truth_result *r, const double fr
     }
     if (!(renderer == CULLING ? r->culling : r->two_sided)[object].confirmed) {
         fail_msg("renderer %d: object %u is seen at (%g, %g, %g)", renderer, object,
-                 (double)(from[0] + sure * (to[0] - from[0])), (double)(from[1] + sure * (to[1] - from[1])),
+                 (double)(from[0] + sure * (to[0] - from[0])),
+                 (double)(from[1] + sure * (to[1] - from[1])),
                  (double)(from[2] + sure * (to[2] - from[2])));
     }
     return 1;

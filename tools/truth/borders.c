@@ -1,9 +1,9 @@
 /* What lies just beside the silhouettes of seen triangles.
  *
- * A part of an object that can be seen is bounded, in the picture, by silhouette edges of what is in
- * front of it or by its own. So rays just outside every silhouette edge of everything seen find most of
- * what a grid misses: slits, and tips behind corners. What they find has borders of its own, which the
- * next round walks.
+ * A part of an object that can be seen is bounded, in the picture, by silhouette edges of what
+ * is in front of it or by its own. So rays just outside every silhouette edge of everything seen
+ * find most of what a grid misses: slits, and tips behind corners. What they find has borders of
+ * its own, which the next round walks.
  */
 #include <math.h>
 #include <stdlib.h>
@@ -15,9 +15,9 @@
 #define SAMPLE_PIXELS 1.0
 #define HALVINGS 5
 
-/* How far beside an edge, in grid cells: each ray anywhere between, evenly in the logarithm, since slits
- * have no natural width. 0: along the edge itself, where cracks between triangles that only nearly meet
- * (T-junctions) let rays through; shared edges do not. */
+/* How far beside an edge, in grid cells: each ray anywhere between, evenly in the logarithm,
+ * since slits have no natural width. 0: along the edge itself, where cracks between triangles
+ * that only nearly meet (T-junctions) let rays through; shared edges do not. */
 static const double beside[][2] = {{0.0, 0.0}, {1e-5, 1e-2}, {1e-2, 0.5}};
 
 typedef struct half_edge {
@@ -99,8 +99,9 @@ const uint32_t *oracle_neighbours(truth *t, uint32_t number)
     }
     qsort(edges, count, sizeof(*edges), by_corners);
     for (size_t i = 0, next; i < count; i = next) {
-        for (next = i + 1; next < count && edges[next].low == edges[i].low &&
-                           edges[next].high == edges[i].high; ++next) {
+        for (next = i + 1;
+             next < count && edges[next].low == edges[i].low && edges[next].high == edges[i].high;
+             ++next) {
         }
         if (next == i + 2) {
             out[edges[i].slot] = edges[i + 1].slot / 3;
@@ -295,7 +296,8 @@ void border_item(worker *w, uint64_t item)
     oracle_triangle(t, low, triangle, v);
     int side = facing(s, v);
     for (int i = 0; i < 3; ++i) {
-        /* Corners 1 and 2 of mirrored objects are swapped: edge i of the mesh is edge 2 - i here. */
+        /* Corners 1 and 2 of mirrored objects are swapped: edge i of the mesh is edge 2 - i
+         * here. */
         int e = t->mirrored[low] ? 2 - i : i;
         uint32_t other = neighbours[3 * (size_t)triangle + (size_t)i];
         float u[3][3];

@@ -13,7 +13,8 @@ static double centre(const oracle_chunk *chunk, int axis)
     return (double)chunk->box.min[axis] + chunk->box.max[axis];
 }
 
-/* Order [first, last) so that what lies before `middle` is not above what lies behind (quickselect). */
+/* Order [first, last) so that what lies before `middle` is not above what lies behind
+ * (quickselect). */
 static void part_at(oracle_chunk *order, uint32_t first, uint32_t last, uint32_t middle, int axis)
 {
     while (last - first > 1) {
@@ -53,9 +54,11 @@ static void grow_box(umb_aabb *box, const float min[3], const float max[3])
     }
 }
 
-static const umb_aabb empty_box = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+static const umb_aabb empty_box = {{INFINITY, INFINITY, INFINITY},
+                                   {-INFINITY, -INFINITY, -INFINITY}};
 
-/* The tree is implicit: a node is a range, halved at its middle; boxes lie in the order of a walk. */
+/* The tree is implicit: a node is a range, halved at its middle; boxes lie in the order of a
+ * walk. */
 static void build(truth *t, uint32_t first, uint32_t last, uint32_t *used)
 {
     oracle_box_node *node = &t->box_nodes[(*used)++];
@@ -172,8 +175,8 @@ static bool walk(box_walk *w, uint32_t first, uint32_t last)
     return true;
 }
 
-bool oracle_boxes_walk(const truth *t, const double from[3], const double to[3], oracle_visit *visit,
-                       void *user)
+bool oracle_boxes_walk(const truth *t, const double from[3], const double to[3],
+                       oracle_visit *visit, void *user)
 {
     box_walk w = {.t = t, .from = from, .to = to, .visit = visit, .user = user};
     return t->chunk_count == 0 || walk(&w, 0, t->chunk_count);

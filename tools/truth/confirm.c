@@ -1,12 +1,13 @@
 /* Exact confirmation of a sight-line.
  *
- * The line is the one through the eye and a given double point (orthographic: through the point, along
- * forward), and nothing about it is rounded: which of the object's triangles it crosses, whether that
- * is inside the view, and which triangles it touches before, are signs of exact sums. Boxes of triangles
- * are passed over in double, with room for its rounding; that can only add triangles to look at.
+ * The line is the one through the eye and a given double point (orthographic: through the point,
+ * along forward), and nothing about it is rounded: which of the object's triangles it crosses,
+ * whether that is inside the view, and which triangles it touches before, are signs of exact sums.
+ * Boxes of triangles are passed over in double, with room for its rounding; that can only add
+ * triangles to look at.
  *
- * Wherever a case is left open (a line in a blocker's plane, a number too long) the answer is "not
- * confirmed": a confirmed line is free under every reading of the definition.
+ * Wherever a case is left open (a line in a blocker's plane, a number too long) the answer is
+ * "not confirmed": a confirmed line is free under every reading of the definition.
  */
 #include <math.h>
 #include <string.h>
@@ -68,7 +69,8 @@ static int linear_sign(confirmation *c, const linear *f, const exact_crossing *a
     return exact_along_sign(at, &f->base, &f->slope, &c->lost);
 }
 
-/* Sign of (X - eye).axis - limit * (perspective: (X - eye).forward) at a crossing in front of the eye. */
+/* Sign of (X - eye).axis - limit * (perspective: (X - eye).forward) at a crossing in front of
+ * the eye. */
 static int side_sign(confirmation *c, const double axis[3], double limit, const exact_crossing *at)
 {
     const umb_view *view = c->v->view;
@@ -124,8 +126,8 @@ static bool is_on_border(confirmation *c, float v[3][3])
     return false;
 }
 
-/* Where the line meets a triangle of the object: a crossing, or, edge-on and without area, the point of
- * its border that the line was drawn through. */
+/* Where the line meets a triangle of the object: a crossing, or, edge-on and without area, the
+ * point of its border that the line was drawn through. */
 static bool reach(confirmation *c, float v[3][3], exact_crossing *at)
 {
     exact_meeting meeting = exact_line_triangle(&c->line, v, at, &c->lost);
@@ -209,8 +211,7 @@ static bool blocks(confirmation *c, uint32_t object, uint32_t triangle)
     if (c->renderer == TRUTH_CULLING && !oracle_shown(flags, at.facing)) {
         return false;
     }
-    return linear_sign(c, &c->beyond_near, &at) >= 0 &&
-           exact_compare(&at, &c->target, &c->lost) < 0;
+    return linear_sign(c, &c->beyond_near, &at) >= 0 && exact_compare(&at, &c->target, &c->lost) < 0;
 }
 
 static bool passes_chunk(void *user, const oracle_chunk *chunk)
@@ -254,8 +255,8 @@ bool oracle_confirm(const truth *t, const oracle_view *v, const double through[3
     return true;
 }
 
-/* What has no area, or none seen from here, is met only by lines drawn through points of its border that
- * doubles can say: corners, and 1024ths of an edge near the point where rays met it. */
+/* What has no area, or none seen from here, is met only by lines drawn through points of its
+ * border that doubles can say: corners, and 1024ths of an edge near the point where rays met it. */
 static bool confirm_on_border(const truth *t, const oracle_view *v, const double through[3],
                               uint32_t object, float corner[3][3], uint8_t renderer,
                               truth_witness *out)
@@ -273,8 +274,7 @@ static bool confirm_on_border(const truth *t, const oracle_view *v, const double
             for (int i = 0; i < 3; ++i) {
                 point[i] = a[i] + share * ((double)b[i] - a[i]);
             }
-            if (share >= 0.0 && share <= 1.0 &&
-                oracle_confirm(t, v, point, object, renderer, out)) {
+            if (share >= 0.0 && share <= 1.0 && oracle_confirm(t, v, point, object, renderer, out)) {
                 return true;
             }
         }

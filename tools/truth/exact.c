@@ -1,5 +1,5 @@
-/* Expansions after Shewchuk (Adaptive Precision Floating-Point Arithmetic, 1997), kept simple: every
- * operation grows a sum term by term and compresses it, so lengths stay near bits / 53. */
+/* Expansions after Shewchuk (Adaptive Precision Floating-Point Arithmetic, 1997), kept simple:
+ * every operation grows a sum term by term and compresses it, so lengths stay near bits / 53. */
 #include "exact.h"
 
 #include <float.h>
@@ -286,8 +286,8 @@ static void edge_of(exact out[3], const float a[3], const float b[3])
     }
 }
 
-/* Sign of direction . ((a - o) x (b - o)): which way the line passes the edge a -> b.
- * The double value is trusted outside Shewchuk's error bound of orient3d, (7 + 56e) e times the sum of
+/* Sign of direction . ((a - o) x (b - o)): which way the line passes the edge a -> b. The double
+ * value is trusted outside Shewchuk's error bound of orient3d, (7 + 56e) e times the sum of
  * magnitudes; ours has the same shape and 16 e covers it. */
 static int passing_sign(const exact_line *line, const float a[3], const float b[3], bool *lost)
 {
@@ -345,8 +345,7 @@ int exact_compare(const exact_crossing *a, const exact_crossing *b, bool *lost)
     double sa = exact_estimate(&a->numerator) / exact_estimate(&a->denominator);
     double sb = exact_estimate(&b->numerator) / exact_estimate(&b->denominator);
     if (a->numerator.count >= 0 && b->numerator.count >= 0 && a->denominator.count > 0 &&
-        b->denominator.count > 0 &&
-        fabs(sa - sb) > 64.0 * DBL_EPSILON * (fabs(sa) + fabs(sb))) {
+        b->denominator.count > 0 && fabs(sa - sb) > 64.0 * DBL_EPSILON * (fabs(sa) + fabs(sb))) {
         return sa > sb ? 1 : -1;
     }
     exact p, q, difference;

@@ -1,8 +1,9 @@
 /* Exact arithmetic for the oracle's confirmations: sums of doubles that do not overlap (Shewchuk's
  * expansions), and what a line does to a triangle, decided without rounding.
  *
- * Exact while no product underflows: exact_in_range() says which inputs are allowed. A value that grows
- * past its room is lost: it says so, and whoever asks must then answer "not confirmed".
+ * Exact while no product underflows: exact_in_range() says which inputs are allowed. A value
+ * that grows past its room is lost: it says so, and whoever asks must then answer "not
+ * confirmed".
  */
 #ifndef EXACT_H
 #define EXACT_H
@@ -11,7 +12,8 @@
 
 #define EXACT_TERMS 64
 
-/* The sum of term[0..count), by growing magnitude, no two sharing a bit; count 0 is zero, -1 is lost. */
+/* The sum of term[0..count), by growing magnitude, no two sharing a bit; count 0 is zero, -1 is
+ * lost. */
 typedef struct exact {
     int count;
     double term[EXACT_TERMS];
@@ -29,7 +31,8 @@ double exact_estimate(const exact *x);
 /* Zero, or of a size with which degree-six polynomials neither overflow nor underflow. */
 bool exact_in_range(double x);
 
-/* The points origin + s * direction. The direction is exact: a difference of doubles, or a vector. */
+/* The points origin + s * direction. The direction is exact: a difference of doubles, or a
+ * vector. */
 typedef struct exact_line {
     double origin[3];
     exact direction[3];

@@ -6,7 +6,8 @@
 
 #include "truth.h"
 
-/* A traced geometry's triangles: primitive number -> object (flattened scenes) and mesh triangle. */
+/* A traced geometry's triangles: primitive number -> object (flattened scenes) and mesh
+ * triangle. */
 typedef struct oracle_part {
     uint32_t *objects; /* NULL in instanced scenes: the instance says it */
     uint32_t *triangles;
@@ -22,8 +23,8 @@ typedef struct oracle_chunk {
     uint32_t object, first, last;
 } oracle_chunk;
 
-/* A node of the tree over chunks, in the order of a walk; after: the node to go on with when this one is
- * passed over. */
+/* A node of the tree over chunks, in the order of a walk; after: the node to go on with when
+ * this one is passed over. */
 typedef struct oracle_box_node {
     umb_aabb box;
     uint32_t after;
@@ -33,17 +34,17 @@ struct truth {
     const model *model;
     RTCDevice device;
     RTCScene scene;
-    bool flat;                /* one soup of world vertices; else instances of mesh scenes */
-    float *vertices;          /* flat: world vertices of all objects */
+    bool flat;       /* one soup of world vertices; else instances of mesh scenes */
+    float *vertices; /* flat: world vertices of all objects */
     uint32_t *indices[PART_KINDS];
     uint64_t *first_vertex;   /* flat: per object, into vertices */
     uint64_t *first_triangle; /* per object, and the total at the end: numbers triangles of objects */
     bool *mirrored;           /* per object */
-    oracle_part parts[PART_KINDS]; /* flat */
+    oracle_part parts[PART_KINDS];         /* flat */
     oracle_part (*mesh_parts)[PART_KINDS]; /* instanced: per mesh */
     RTCScene *mesh_scenes;
-    uint32_t **neighbours;    /* per mesh, three per triangle, made when first needed */
-    oracle_chunk *chunks;     /* in the order of the tree's leaves */
+    uint32_t **neighbours; /* per mesh, three per triangle, made when first needed */
+    oracle_chunk *chunks;  /* in the order of the tree's leaves */
     uint32_t chunk_count;
     oracle_box_node *box_nodes;
 };
@@ -60,25 +61,25 @@ truth *oracle_create(const model *m, oracle_form form, umb_error *error);
 /* World corners of a triangle, counter-clockwise seen from its front. */
 void oracle_triangle(const truth *t, uint32_t object, uint32_t triangle, float v[3][3]);
 uint8_t oracle_flags(const truth *t, uint32_t object, uint32_t triangle);
-/* A mesh's neighbours across its edges (corner i to i + 1), found by equal positions; MODEL_NONE where
- * there is no single one. NULL when memory is short. Not safe from two threads at once. */
+/* A mesh's neighbours across its edges (corner i to i + 1), found by equal positions; MODEL_NONE
+ * where there is no single one. NULL when memory is short. Not safe from two threads at once. */
 const uint32_t *oracle_neighbours(truth *t, uint32_t mesh);
 
 /* The tree over chunks (boxes.c). */
 bool oracle_boxes_build(truth *t);
 typedef bool oracle_visit(void *user, const oracle_chunk *chunk);
-/* Visit every chunk whose box the segment touches, until visit returns false; returns whether all were
- * visited. */
-bool oracle_boxes_walk(const truth *t, const double from[3], const double to[3], oracle_visit *visit,
-                       void *user);
+/* Visit every chunk whose box the segment touches, until visit returns false; returns whether
+ * all were visited. */
+bool oracle_boxes_walk(const truth *t, const double from[3], const double to[3],
+                       oracle_visit *visit, void *user);
 
 /* A view as half-spaces, and how far anything can be. */
 typedef struct oracle_view {
     const umb_view *view;
     double planes[6 + UMB_MAX_CLIP_PLANES][4]; /* inside where >= 0 */
     uint32_t plane_count;
-    double far_depth;  /* the view's, or just beyond the scene where that is nearer */
-    double pixel[2];   /* size of a grid cell at depth 1 (orthographic: anywhere) */
+    double far_depth; /* the view's, or just beyond the scene where that is nearer */
+    double pixel[2];  /* size of a grid cell at depth 1 (orthographic: anywhere) */
 } oracle_view;
 
 void oracle_view_make(const truth *t, const umb_view *view, const truth_options *options,
@@ -101,10 +102,10 @@ bool oracle_sight_make(const oracle_view *v, const double through[3], oracle_sig
 void oracle_sight_at(const oracle_sight *s, double depth_beyond_near, double out[3]);
 
 typedef struct oracle_hit {
-    uint32_t object;   /* MODEL_NONE: nothing */
+    uint32_t object; /* MODEL_NONE: nothing */
     uint32_t triangle;
-    double depth;      /* view depth beyond the near plane */
-    int facing;        /* -1 from the front, 1 from the back, 0 edge-on */
+    double depth; /* view depth beyond the near plane */
+    int facing;   /* -1 from the front, 1 from the back, 0 edge-on */
 } oracle_hit;
 
 /* First blocking hits for either renderer, and the open surfaces before the farther one. The arrays
@@ -119,7 +120,8 @@ typedef struct oracle_trace {
 
 void oracle_trace_ray(const truth *t, const oracle_view *v, const oracle_sight *sight,
                       oracle_trace *trace);
-/* Depth beyond near at which the line crosses the triangle's plane; fallback where it runs along. */
+/* Depth beyond near at which the line crosses the triangle's plane; fallback where it runs
+ * along. */
 double oracle_plane_depth(float v[3][3], const oracle_sight *sight, double fallback, int *facing);
 /* True if a triangle so met is shown by TRUTH_CULLING. */
 bool oracle_shown(uint8_t flags, int facing);
@@ -127,8 +129,8 @@ bool oracle_shown(uint8_t flags, int facing);
 /* Is the sight-line through this point free up to the object, in exact arithmetic (confirm.c)? */
 bool oracle_confirm(const truth *t, const oracle_view *v, const double through[3], uint32_t object,
                     uint8_t renderer, truth_witness *out);
-/* The same for a line that rays found to end on a triangle of the object: if it does not hold, lines
- * near it are tried. */
+/* The same for a line that rays found to end on a triangle of the object: if it does not hold,
+ * lines near it are tried. */
 bool oracle_confirm_near(const truth *t, const oracle_view *v, const double through[3],
                          uint32_t object, uint32_t triangle, uint8_t renderer, truth_witness *out);
 

@@ -1,5 +1,5 @@
-/* The search for visible objects: a dense grid, then rays aimed where something may have been missed,
- * in rounds, until a round finds nothing new or the budget is spent. */
+/* The search for visible objects: a dense grid, then rays aimed where something may have been
+ * missed, in rounds, until a round finds nothing new or the budget is spent. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -12,7 +12,8 @@
 #define MAX_ROUNDS 64u
 #define EXTREMES 9
 #define SCANNED_TRIANGLES 4096u
-#define ROUND_SHARE 300000u /* about as many rays aimed in a round, shared by the objects not seen */
+#define ROUND_SHARE                                                                                \
+    300000u /* about as many rays aimed in a round, shared by the objects not seen */
 #define MAX_VISITS 48u
 
 static uint32_t cast_picture(worker *w, double x, double y)
@@ -36,7 +37,8 @@ static void jitter_item(worker *w, uint64_t row)
     search *s = w->s;
     for (uint32_t x = 0; x < s->grid_width; ++x) {
         uint64_t random = oracle_mix(s->round, row, x);
-        cast_picture(w, x + oracle_unit(random), (double)row + oracle_unit(oracle_mix(random, 0, 1)));
+        cast_picture(w, x + oracle_unit(random),
+                     (double)row + oracle_unit(oracle_mix(random, 0, 1)));
     }
 }
 
@@ -47,7 +49,8 @@ static void halve_cells(worker *w, const double a[2], const double b[2], uint32_
     double low = 0.0, high = 1.0;
     for (int i = 0; i < 5 && seen_a != seen_b; ++i) {
         double middle = 0.5 * (low + high);
-        uint32_t seen = cast_picture(w, a[0] + middle * (b[0] - a[0]), a[1] + middle * (b[1] - a[1]));
+        uint32_t seen = cast_picture(w, a[0] + middle * (b[0] - a[0]),
+                                     a[1] + middle * (b[1] - a[1]));
         if (seen == seen_b) {
             high = middle;
         } else {
@@ -82,7 +85,7 @@ typedef struct extreme {
 
 static void find_extremes(const search *s, uint32_t object, extreme best[EXTREMES])
 {
-    static const double turn[8][2] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1},
+    static const double turn[8][2] = {{1, 0}, {-1, 0}, {0, 1},  {0, -1},
                                       {1, 1}, {1, -1}, {-1, 1}, {-1, -1}};
     const truth *t = s->t;
     const umb_view *view = s->view.view;
@@ -204,7 +207,8 @@ static void target_item(worker *w, uint64_t item)
     aim_at_triangles(w, object, missing);
 }
 
-/* Objects worth aiming at: in view and not seen; seen for one renderer only, in the first rounds. */
+/* Objects worth aiming at: in view and not seen; seen for one renderer only, in the first
+ * rounds. */
 static void choose_targets(search *s)
 {
     const model *m = s->t->model;

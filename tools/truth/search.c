@@ -78,9 +78,9 @@ static void note(worker *w, const oracle_sight *sight, const oracle_hit *hit, ui
         note_triangle(w, hit->object, hit->triangle);
     }
     uint8_t reported = w->reported[hit->object];
-    uint8_t fresh = renderers & (uint8_t)~(search_known(w->s, hit->object) | reported);
+    uint8_t fresh = renderers & (uint8_t) ~(search_known(w->s, hit->object) | reported);
     if (w->along_edge) {
-        fresh &= (uint8_t)~(reported >> 2);
+        fresh &= (uint8_t) ~(reported >> 2);
     }
     if (fresh == 0 || w->s->finds[0][hit->object].refuted + w->s->finds[1][hit->object].refuted >=
                           (w->along_edge ? MAX_EDGE_LEAKS : MAX_LEAKS)) {
@@ -103,7 +103,8 @@ static void note(worker *w, const oracle_sight *sight, const oracle_hit *hit, ui
 }
 
 /* Which renderers show this hit, given how far the line is free for each. */
-static uint8_t shown_to(const worker *w, const oracle_hit *hit, double free_culling, double free_both)
+static uint8_t shown_to(const worker *w, const oracle_hit *hit, double free_culling,
+                        double free_both)
 {
     uint8_t flags = oracle_flags(w->s->t, hit->object, hit->triangle);
     uint8_t renderers = 0;
@@ -126,15 +127,13 @@ static bool cast(worker *w, const double through[3], oracle_sight *sight)
     oracle_trace_ray(w->s->t, &w->s->view, sight, trace);
     double free_culling = trace->culling.depth, free_both = trace->two_sided.depth;
     if (trace->two_sided.object != MODEL_NONE) {
-        note(w, sight, &trace->two_sided,
-             shown_to(w, &trace->two_sided, free_culling, free_both));
+        note(w, sight, &trace->two_sided, shown_to(w, &trace->two_sided, free_culling, free_both));
     }
     if (trace->culling.object != MODEL_NONE && free_culling > free_both) {
         note(w, sight, &trace->culling, shown_to(w, &trace->culling, free_culling, free_both));
     }
     for (uint32_t i = 0; i < trace->open_count; ++i) {
-        note(w, sight, &trace->open[i],
-             shown_to(w, &trace->open[i], free_culling, free_both));
+        note(w, sight, &trace->open[i], shown_to(w, &trace->open[i], free_culling, free_both));
     }
     w->failed |= trace->out_of_memory;
     return true;
@@ -146,7 +145,8 @@ bool search_cast(worker *w, const double through[3])
     return cast(w, through, &sight);
 }
 
-/* Is the first hit at the target's depth or behind it, measured in double on the hit's own plane? */
+/* Is the first hit at the target's depth or behind it, measured in double on the hit's own
+ * plane? */
 static bool reaches(const worker *w, const oracle_sight *sight, const oracle_hit *hit, double depth)
 {
     double slack = 1e-12 * (fabs(depth) + w->s->view.view->near_depth);

@@ -1,9 +1,9 @@
 /* One search of a view: workers that cast rays, and how what they find is merged so that the answer
  * does not depend on their number.
  *
- * Work comes as phases of numbered items. An item's rays depend on its number and on what was known
- * when its block of items began, never on what other workers find meanwhile; a find is named by its ray
- * number (phase, item, ray of the item) and the smallest number wins.
+ * Work comes as phases of numbered items. An item's rays depend on its number and on what was
+ * known when its block of items began, never on what other workers find meanwhile; a find is
+ * named by its ray number (phase, item, ray of the item) and the smallest number wins.
  */
 #ifndef SEARCH_H
 #define SEARCH_H
@@ -14,8 +14,8 @@
 /* Set in the numbers of rays along edges: any other find of the block is preferred. */
 #define RAY_ALONG_EDGE ((uint64_t)1 << 63)
 
-/* What is known of one object for one renderer. A find is a ray's word until it is verified; one that
- * exact arithmetic refutes is forgotten, and remembered as a leak. */
+/* What is known of one object for one renderer. A find is a ray's word until it is verified; one
+ * that exact arithmetic refutes is forgotten, and remembered as a leak. */
 typedef struct find {
     uint64_t ray; /* NO_RAY: not seen */
     double through[3], from[3], to[3];
@@ -33,15 +33,15 @@ typedef struct find_event {
 typedef struct worker {
     struct search *s;
     oracle_trace trace;
-    uint64_t ray;            /* number of the ray being cast */
-    uint8_t *reported;       /* per object: renderers that this worker has an event for; two bits up,
+    uint64_t ray;      /* number of the ray being cast */
+    uint8_t *reported; /* per object: renderers that this worker has an event for; two bits up,
                                 those by rays along edges */
     find_event *events;
     size_t event_count, event_capacity;
-    uint64_t *triangles;     /* seen triangles, some more than once */
+    uint64_t *triangles; /* seen triangles, some more than once */
     size_t triangle_count, triangle_capacity;
-    uint64_t recent[256];    /* triangles put there lately */
-    bool along_edge;         /* the rays being cast may slip through cracks of floats: what they see gets no
+    uint64_t recent[256]; /* triangles put there lately */
+    bool along_edge; /* the rays being cast may slip through cracks of floats: what they see gets no
                                 borders walked */
     bool failed;
 } worker;
@@ -50,19 +50,19 @@ typedef struct search {
     truth *t;
     const truth_options *options;
     oracle_view view;
-    find *finds[2];          /* per object: for TRUTH_CULLING, for TRUTH_TWO_SIDED */
-    uint8_t *in_view;        /* per object: its box meets the view */
-    uint64_t *known;         /* bits: triangles seen */
-    uint64_t *fresh;         /* triangles seen since the borders were last walked, ascending */
+    find *finds[2];   /* per object: for TRUTH_CULLING, for TRUTH_TWO_SIDED */
+    uint8_t *in_view; /* per object: its box meets the view */
+    uint64_t *known;  /* bits: triangles seen */
+    uint64_t *fresh;  /* triangles seen since the borders were last walked, ascending */
     size_t fresh_count, fresh_capacity;
-    uint64_t *border;        /* triangles whose borders the running phase walks */
+    uint64_t *border; /* triangles whose borders the running phase walks */
     size_t border_capacity;
-    uint32_t *targets;       /* objects that the running phase aims at */
+    uint32_t *targets; /* objects that the running phase aims at */
     uint32_t target_count;
-    uint32_t *grid;          /* object seen through each grid cell, both sides shown */
+    uint32_t *grid; /* object seen through each grid cell, both sides shown */
     uint32_t grid_width, grid_height;
     truth_witness *proven[2]; /* per object: verified finds */
-    find *leaks[2];          /* per object: the first refuted find, or NO_RAY */
+    find *leaks[2];           /* per object: the first refuted find, or NO_RAY */
     worker *workers;
     uint32_t worker_count;
     uint64_t phase, round;
@@ -75,10 +75,12 @@ typedef void (*search_item)(worker *w, uint64_t item);
 
 /* Do items [0, count) in blocks; guided phases stop between blocks when the budget is spent. */
 void search_phase(search *s, search_item item, uint64_t count, bool guided);
-/* Cast the ray through a point and note what it shows. w->trace keeps it. False: not in the picture. */
+/* Cast the ray through a point and note what it shows. w->trace keeps it. False: not in the
+ * picture. */
 bool search_cast(worker *w, const double through[3]);
-/* The same, aimed at a point of a triangle: the object counts as seen too when what the ray met lies at
- * the same depth as the point or behind it. Returns for which renderers the ray showed the object. */
+/* The same, aimed at a point of a triangle: the object counts as seen too when what the ray met
+ * lies at the same depth as the point or behind it. Returns for which renderers the ray showed
+ * the object. */
 uint8_t search_aim(worker *w, const double through[3], uint32_t object, uint32_t triangle);
 /* Renderers for which the object had been seen when the running block began. */
 uint8_t search_known(const search *s, uint32_t object);

@@ -1,5 +1,5 @@
-/* Views, sight-lines and where to aim: plain double geometry. Nothing here is trusted by an accusation:
- * confirm.c decides again, exactly. */
+/* Views, sight-lines and where to aim: plain double geometry. Nothing here is trusted by an
+ * accusation: confirm.c decides again, exactly. */
 #include <math.h>
 #include <string.h>
 

@@ -1,8 +1,8 @@
 /* One sight-line through the scene: the first blocking surface for either renderer and the open
  * surfaces before it.
  *
- * A front face met first settles both renderers with one ray. Only where a one-sided face is met from
- * its back does the renderer that culls back faces need a second ray.
+ * A front face met first settles both renderers with one ray. Only where a one-sided face is met
+ * from its back does the renderer that culls back faces need a second ray.
  */
 #include <math.h>
 #include <stdlib.h>

@@ -1,8 +1,8 @@
 /* The traced scene: one soup of exact world triangles where that fits, else instances.
  *
- * A soup is traced on the very floats that the definition speaks of. Instances are traced by moving
- * the ray, so their hits are candidates only; everything told about them is computed again from world
- * corners. The soup is chosen up to FLAT_TRIANGLES: about 250 bytes a triangle.
+ * A soup is traced on the very floats that the definition speaks of. Instances are traced by
+ * moving the ray, so their hits are candidates only; everything told about them is computed
+ * again from world corners. The soup is chosen up to FLAT_TRIANGLES: about 250 bytes a triangle.
  */
 #include <math.h>
 #include <stdio.h>
@@ -54,8 +54,8 @@ static bool degenerate(float v[3][3])
         area += n * n;
         length += (e[j] * e[j] + e[k] * e[k]) * (f[j] * f[j] + f[k] * f[k]);
     }
-    /* Thinner than 1e-12 of its size: no ray of floats decides anything about it. Such triangles are
-     * left to exact confirmation. */
+    /* Thinner than 1e-12 of its size: no ray of floats decides anything about it. Such triangles
+     * are left to exact confirmation. */
     return !(area > 1e-24 * length);
 }
 
@@ -213,9 +213,11 @@ static bool build_mesh(truth *t, uint32_t number)
         }
         RTCGeometry g = rtcNewGeometry(t->device, RTC_GEOMETRY_TYPE_TRIANGLE);
         float *v = g ? rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12,
-                                               mesh->position_count) : NULL;
+                                               mesh->position_count)
+                     : NULL;
         uint32_t *index = g ? rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                                      12, part->count) : NULL;
+                                                      12, part->count)
+                            : NULL;
         if (!v || !index) {
             return false;
         }
@@ -286,7 +288,8 @@ static bool prepare(truth *t, oracle_form form)
     t->first_triangle[m->object_count] = triangles;
     t->flat = form == ORACLE_FLAT || (form == ORACLE_EITHER && triangles <= FLAT_TRIANGLES &&
                                       vertices <= 3u * FLAT_TRIANGLES);
-    /* One thread builds: a tree that depends on timing would make ties between equal depths do so. */
+    /* One thread builds: a tree that depends on timing would make ties between equal depths do
+     * so. */
     t->device = rtcNewDevice("threads=1");
     t->scene = t->device ? rtcNewScene(t->device) : NULL;
     return t->scene != NULL;
