@@ -126,13 +126,13 @@ static bool reserve(umb_culler *c, const umb_tree *tree, const umb_committed *sc
     return true;
 }
 
-static bool hidden(walk *w, uint32_t ref, const umb_image *image)
+static bool hidden(walk *w, uint32_t ref, const umb_image *image, const umb_outline *outline)
 {
     const umb_culler *c = w->culler;
     if (c->ops == NULL) {
         return false;
     }
-    umb_query query = {*image, ref};
+    umb_query query = {*image, outline, ref};
     umb_verdict verdict;
     c->ops->submit(c->method, &query, 1, &verdict);
     w->stats.queries += 1;
@@ -175,7 +175,7 @@ static void consider(walk *w, const umb_node *node, const umb_projected *p, uint
             return;
         }
         item.image = umb_image_of_bounds(&w->map, &b);
-        if (hidden(w, item.ref, &item.image)) {
+        if (hidden(w, item.ref, &item.image, NULL)) {
             count_hidden(w, item.ref);
             return;
         }
@@ -214,15 +214,10 @@ static void draw(walk *w, uint32_t occluder)
     }
 }
 
-/* Leaves of at most this many triangles are looked at triangle by triangle; larger ones are solids, whose
- * box says as much. */
-#define LEAF_TRIANGLES 4u
-
-/* True if the parts of the shape say more than the object's box. */
+/* True if the object is its shape, so that its parts and triangles say more than its box. */
 static bool refinable(const walk *w, const umb_object *o)
 {
-    return o->refine && w->culler->ops != NULL &&
-           (o->mesh->part_count > 1 || !o->identity || o->mesh->seen_count <= LEAF_TRIANGLES);
+    return o->refine && w->culler->ops != NULL && o->mesh->seen_count > 0;
 }
 
 /* True if a triangle of a leaf may be seen; *settled becomes the greatest view depth in view of the first
@@ -241,13 +236,15 @@ static bool triangles_show(walk *w, const umb_object *o, uint32_t ref, const umb
             }
         }
         umb_image_bounds b;
-        umb_depth_place place = umb_image_of_triangle(&w->map, (const float(*)[3])world, &b);
+        umb_outline outline;
+        umb_depth_place place =
+            umb_outline_of_triangle(&w->map, (const float(*)[3])world, &outline, &b);
         if (place == UMB_DEPTH_OUTSIDE) {
             continue;
         }
         *settled = place == UMB_DEPTH_BEYOND ? b.w_max : -INFINITY;
         umb_image image = umb_image_of_bounds(&w->map, &b);
-        if (place == UMB_DEPTH_CROSSING || !hidden(w, ref, &image)) {
+        if (place == UMB_DEPTH_CROSSING || !hidden(w, ref, &image, &outline)) {
             return true;
         }
     }
@@ -262,16 +259,14 @@ static bool parts_show(walk *w, const umb_object *o, umb_waiting *item)
     while (item->part < mesh->part_count) {
         const umb_part *part = &mesh->parts[item->part];
         bool leaf = part->skip == item->part + 1;
-        bool small = leaf && part->end - part->begin <= LEAF_TRIANGLES;
         umb_image_bounds b;
         umb_depth_place place = umb_image_of_part(&w->map, &part->box, &o->transform, o->identity, &b);
         bool over = place == UMB_DEPTH_OUTSIDE;
         if (place == UMB_DEPTH_BEYOND) {
             umb_image image = umb_image_of_bounds(&w->map, &b);
-            over = hidden(w, item->ref, &image);
-            item->settled = b.w_max;
+            over = hidden(w, item->ref, &image, NULL);
         }
-        if (!over && leaf && (small || place == UMB_DEPTH_CROSSING)) {
+        if (!over && leaf) {
             over = !triangles_show(w, o, item->ref, part, &item->settled);
         }
         if (!over && leaf) {
@@ -324,7 +319,7 @@ static void run(walk *w)
     }
     while (c->heap.count > 0) {
         umb_waiting item = umb_heap_pop(&c->heap);
-        if (item.testable && item.stamp != w->drawn && hidden(w, item.ref, &item.image)) {
+        if (item.testable && item.stamp != w->drawn && hidden(w, item.ref, &item.image, NULL)) {
             count_hidden(w, item.ref);
             continue;
         }

@@ -100,6 +100,86 @@ bool umb_coverage_hides(const umb_coverage *c, umb_pixel_rect rect, float nearne
     return true;
 }
 
+/* Columns that an outline enters in a row, [*first, *last]; false if none. The row's closed band and the
+ * outline are grown by the error; interpolating adds fewer than 16 units of the coordinates. */
+static bool outline_span(const umb_outline *o, uint32_t row, uint32_t width, uint32_t *first, uint32_t *last)
+{
+    double low = INFINITY, high = -INFINITY, y0 = row - o->error, y1 = row + 1.0 + o->error;
+    for (uint32_t i = 0; i < o->count; ++i) {
+        uint32_t k = i + 1 < o->count ? i + 1 : 0;
+        double px = o->x[i], py = o->y[i], qx = o->x[k], qy = o->y[k];
+        if ((py < y0 && qy < y0) || (py > y1 && qy > y1)) {
+            continue;
+        }
+        double x[2] = {px, qx}, y[2] = {py, qy};
+        for (int end = 0; end < 2; ++end) {
+            double cut = y[end] < y0 ? y0 : y[end] > y1 ? y1 : y[end];
+            /* An end outside the band: move it to the border along the edge, never past the other end. */
+            double at = cut == y[end] ? x[end] : px + (cut - py) * ((qx - px) / (qy - py));
+            double lo = px < qx ? px : qx, hi = px < qx ? qx : px;
+            at = at < lo ? lo : at > hi ? hi : at;
+            double slack = 0x1p-49 * (fabs(px) + fabs(qx));
+            low = at - slack < low ? at - slack : low;
+            high = at + slack > high ? at + slack : high;
+        }
+    }
+    low -= o->error;
+    high += o->error;
+    if (!(high >= 0.0 && low <= width)) {
+        return false;
+    }
+    double from = floor(low), to = ceil(high) - 1.0;
+    from = from < 0.0 ? 0.0 : from > width - 1.0 ? width - 1.0 : from;
+    to = to < from ? from : to > width - 1.0 ? width - 1.0 : to;
+    *first = (uint32_t)from;
+    *last = (uint32_t)to;
+    return true;
+}
+
+/* Most nearness of an outline over the sub-tile at (x, y), up by what covers the plane's relative 2^-22. */
+static double outline_nearness(const umb_outline *o, double x, double y)
+{
+    double z = o->g0 + (o->gx * x + (o->gx > 0.0 ? o->gx * 8.0 : 0.0)) +
+               (o->gy * y + (o->gy > 0.0 ? o->gy * 4.0 : 0.0));
+    z += 0x1p-21 * fabs(z);
+    return z < o->most ? z : o->most;
+}
+
+static bool outline_row_hidden(const umb_coverage *c, const umb_outline *o, uint32_t row, uint32_t first,
+                               uint32_t last)
+{
+    const umb_tile *tiles = c->tiles + (size_t)(row / UMB_TILE_HEIGHT) * c->columns;
+    uint32_t r = row % UMB_TILE_HEIGHT, half = r / 4;
+    for (uint32_t tx = first / UMB_TILE_WIDTH; tx <= last / UMB_TILE_WIDTH; ++tx) {
+        uint32_t x = tx * UMB_TILE_WIDTH;
+        uint32_t need = first > x ? ~0u << (first - x) : ~0u;
+        need &= last < x + 31 ? ~0u >> (x + 31 - last) : ~0u;
+        if ((need & ~tiles[tx].mask[r]) != 0) {
+            return false;
+        }
+        for (uint32_t s = 0; s < 4; ++s) {
+            float z = tiles[tx].z[4 * half + s];
+            if ((need >> (8 * s) & 0xFFu) != 0 && z < o->most &&
+                z < outline_nearness(o, x + 8.0 * s, row - r % 4)) {
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+bool umb_coverage_hides_outline(const umb_coverage *c, umb_pixel_rect rect, const umb_outline *outline)
+{
+    for (int row = rect.y0; row <= rect.y1; ++row) {
+        uint32_t first, last;
+        if (outline_span(outline, (uint32_t)row, c->width, &first, &last) &&
+            !outline_row_hidden(c, outline, (uint32_t)row, first, last)) {
+            return false;
+        }
+    }
+    return true;
+}
+
 void umb_coverage_merge(umb_coverage *c, uint32_t tile, const uint32_t mask[UMB_TILE_HEIGHT],
                         const float z[8])
 {

@@ -38,6 +38,15 @@ typedef struct umb_pixel_rect {
     int16_t x0, y0, x1, y1;
 } umb_pixel_rect;
 
+/* A convex polygon on the raster, each true corner within error of the given one in each coordinate, and
+ * its nearness: nowhere more than gx x + gy y + g0, nor than most. */
+typedef struct umb_outline {
+    double x[9], y[9];
+    uint32_t count;
+    double error;
+    double gx, gy, g0, most;
+} umb_outline;
+
 /* Make room for a raster; reuses what is there. */
 bool umb_coverage_resize(umb_coverage *c, const umb_allocator *a, uint32_t width, uint32_t height);
 void umb_coverage_free(umb_coverage *c, const umb_allocator *a);
@@ -45,6 +54,9 @@ void umb_coverage_clear(umb_coverage *c);
 
 /* True if every pixel of rect is covered by something nearer than nearness. */
 bool umb_coverage_hides(const umb_coverage *c, umb_pixel_rect rect, float nearness);
+
+/* The same for the pixels of rect that an outline enters, against its own nearness. */
+bool umb_coverage_hides_outline(const umb_coverage *c, umb_pixel_rect rect, const umb_outline *outline);
 
 /* Add one occluder's pixels of one tile: mask as above, z a lower bound of its nearness for each
  * sub-tile with a bit. Keeps the invariant whatever the order of calls. */

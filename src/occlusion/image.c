@@ -1,6 +1,7 @@
 #include "image.h"
 
 #include "geometry/transform.h"
+#include "plane.h"
 
 umb_image umb_image_of_bounds(const umb_raster_map *map, const umb_image_bounds *b)
 {
@@ -151,8 +152,22 @@ static int cut_polygon(const umb_raster_map *map, int side, double slack, const 
     return kept;
 }
 
-umb_depth_place umb_image_of_triangle(const umb_raster_map *map, const float corner[3][3],
-                                      umb_image_bounds *out)
+/* Nearness of a triangle from its plane; when that is edge-on, from its nearest corner alone. */
+static void bound_nearness(const umb_raster_map *map, const float corner[3][3], double w_min,
+                           umb_outline *o)
+{
+    double most = map->orthographic ? -w_min : 1.0 / w_min;
+    o->most = most + 0x1p-22 * fabs(most);
+    umb_plane_nearness plane = {0.0, 0.0, o->most, 0.0};
+    umb_face face = umb_face_of(map, corner[0], corner[1], corner[2]);
+    (void)umb_face_nearness(map, &face, corner[0], &plane);
+    o->gx = plane.gx;
+    o->gy = plane.gy;
+    o->g0 = plane.g0 + plane.error;
+}
+
+umb_depth_place umb_outline_of_triangle(const umb_raster_map *map, const float corner[3][3],
+                                        umb_outline *outline, umb_image_bounds *out)
 {
     umb_view_point polygon[2][3 + SIDES];
     double reach = 0.0;
@@ -171,16 +186,21 @@ umb_depth_place umb_image_of_triangle(const umb_raster_map *map, const float cor
     if (count == 0) {
         return UMB_DEPTH_OUTSIDE;
     }
+    double error = 64.0 * UMB_U * reach;
     out->w_min = out->x_min = out->y_min = INFINITY;
     out->w_max = out->x_max = out->y_max = -INFINITY;
+    outline->count = (uint32_t)count;
+    outline->error = 0.0;
     for (int i = 0; i < count; ++i) {
         umb_view_point v = polygon[now][i];
-        double error = 64.0 * UMB_U * reach;
         if (!map->orthographic && !(v.w > 2.0 * error)) {
             return UMB_DEPTH_CROSSING;
         }
         v.reach = reach;
         umb_raster_point p = umb_raster_map_project(map, v, 64.0);
+        outline->x[i] = p.x;
+        outline->y[i] = p.y;
+        outline->error = p.error > outline->error ? p.error : outline->error;
         out->w_min = v.w - error < out->w_min ? v.w - error : out->w_min;
         out->w_max = v.w + error > out->w_max ? v.w + error : out->w_max;
         out->x_min = p.x - p.error < out->x_min ? p.x - p.error : out->x_min;
@@ -188,5 +208,6 @@ umb_depth_place umb_image_of_triangle(const umb_raster_map *map, const float cor
         out->x_max = p.x + p.error > out->x_max ? p.x + p.error : out->x_max;
         out->y_max = p.y + p.error > out->y_max ? p.y + p.error : out->y_max;
     }
+    bound_nearness(map, corner, out->w_min, outline);
     return UMB_DEPTH_BEYOND;
 }

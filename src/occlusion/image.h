@@ -25,9 +25,10 @@ typedef enum umb_depth_place {
 umb_depth_place umb_image_of_part(const umb_raster_map *map, const umb_aabb *part,
                                   const umb_transform *transform, bool identity, umb_image_bounds *out);
 
-/* Image of what the view can see of a triangle of world vertices: it is cut at the near and far depths and
- * at the raster's borders first. CROSSING only where rounding leaves no image. */
-umb_depth_place umb_image_of_triangle(const umb_raster_map *map, const float corner[3][3],
-                                      umb_image_bounds *out);
+/* The outer image of what the view can see of a triangle of world vertices, as the polygon it is: it is
+ * cut at the near and far depths and at the raster's borders first. CROSSING only where rounding leaves
+ * no image; the bounds are valid for BEYOND. */
+umb_depth_place umb_outline_of_triangle(const umb_raster_map *map, const float corner[3][3],
+                                        umb_outline *outline, umb_image_bounds *bounds);
 
 #endif

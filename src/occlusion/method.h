@@ -23,6 +23,7 @@ typedef struct umb_image {
 
 typedef struct umb_query {
     umb_image image;
+    const umb_outline *outline; /* the box holds one triangle, this one; NULL: use all of the image */
     uint32_t ref; /* as in index/tree.h */
 } umb_query;
 

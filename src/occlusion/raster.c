@@ -106,7 +106,9 @@ static void submit(const void *state, const umb_query *queries, uint32_t count, 
     for (uint32_t i = 0; i < count; ++i) {
         const umb_image *image = &queries[i].image;
         bool hidden = image->rect.x0 > image->rect.x1 ||
-                      umb_coverage_hides(&r->coverage, image->rect, image->nearness);
+                      umb_coverage_hides(&r->coverage, image->rect, image->nearness) ||
+                      (queries[i].outline != NULL &&
+                       umb_coverage_hides_outline(&r->coverage, image->rect, queries[i].outline));
         verdicts[i] = hidden ? UMB_VERDICT_HIDDEN : UMB_VERDICT_VISIBLE;
     }
 }

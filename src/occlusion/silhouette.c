@@ -4,19 +4,12 @@
 
 #include "base/memory.h"
 #include "geometry/transform.h"
+#include "plane.h"
 
 /* Slack, in units 2^-53 of scale * reach: a vertex has one subtraction, one product and two sums in each
  * term; a cut adds the interpolation of two vertices. */
 #define VERTEX_SLACK 5.0
 #define CUT_SLACK 16.0
-
-/* A triple product of differences of three vertices and the eye is off by at most this many units times
- * the product of the three factors' sums of absolute components. */
-#define TRIPLE_SLACK 16.0
-
-/* A plane's equation is used for depth when its distance from the eye is this many times the error bound
- * of that distance, whose relative error is then below 2^-24. */
-#define PLANE_TRUST 0x1p24
 
 enum { EDGES, TRIANGLES, VIEWS, POINTS, WORLD, SIDES };
 
@@ -72,32 +65,10 @@ static bool place_vertices(umb_silhouette *s, const umb_raster_map *map, const u
     return any;
 }
 
-/* The plane of a triangle as the eye sees it: normal (by index order), its size, and the signed distance
- * of the eye times the normal's length. */
-typedef struct face {
-    umb_vec3 normal;
-    double size;
-    double distance, distance_error;
-} face;
-
-static face look_at_face(const umb_silhouette *s, const umb_raster_map *map, const uint32_t corner[3])
-{
-    umb_vec3 a = umb_vec3_from_float(s->world[corner[0]]);
-    umb_vec3 ab = umb_vec3_sub(umb_vec3_from_float(s->world[corner[1]]), a);
-    umb_vec3 ac = umb_vec3_sub(umb_vec3_from_float(s->world[corner[2]]), a);
-    umb_vec3 to_eye = map->orthographic ? umb_vec3_scale(map->ray_w, -1.0) : umb_vec3_sub(map->eye, a);
-    face f;
-    f.normal = umb_vec3_cross(ab, ac);
-    f.size = umb_vec3_sum_abs(ab) * umb_vec3_sum_abs(ac);
-    f.distance = umb_vec3_dot(f.normal, to_eye);
-    f.distance_error = TRIPLE_SLACK * UMB_U * f.size * umb_vec3_sum_abs(to_eye);
-    return f;
-}
-
 /* +1: blocks, corners counter-clockwise as seen; -1: blocks, clockwise; 0: does not surely block. */
-static int8_t side_of(const face *f, bool mirrored, bool two_sided)
+static int8_t side_of(const umb_face *f, bool mirrored, bool two_sided)
 {
-    int8_t seen = f->distance > f->distance_error ? 1 : f->distance < -f->distance_error ? -1 : 0;
+    int8_t seen = f->distance > f->error ? 1 : f->distance < -f->error ? -1 : 0;
     int8_t front = mirrored ? -1 : 1;
     return seen == front || two_sided ? seen : 0;
 }
@@ -107,31 +78,6 @@ static double vertex_nearness(const umb_raster_map *map, umb_view_point v)
 {
     double w = v.w + VERTEX_SLACK * UMB_U * v.reach;
     return map->orthographic ? -(w + 4.0 * UMB_U * fabs(w)) : (1.0 - 4.0 * UMB_U) / w;
-}
-
-/* Nearness is affine over the raster: with ray(i, j) the direction through a pixel and N the normal,
- *   perspective: 1 / W = N.ray / N.(a - eye)       parallel: -W = (N.ray - N.(a - eye)) / N.ray_w
- * N is off by 4 units of its size, ray by a few of ray_size, hence 16 for the product; evaluating the sum
- * of three terms adds 4 units of each. Returns false when the plane is too close to edge-on. */
-static bool plane_nearness(umb_depth_triangle *t, const umb_raster_map *map, const face *f,
-                           const float a[3])
-{
-    if (!(fabs(f->distance) >= PLANE_TRUST * f->distance_error)) {
-        return false;
-    }
-    double scale = -1.0 / f->distance;
-    double offset = 0.0, offset_size = 0.0;
-    if (map->orthographic) {
-        umb_vec3 from_eye = umb_vec3_sub(umb_vec3_from_float(a), map->eye);
-        offset = umb_vec3_dot(f->normal, from_eye);
-        offset_size = umb_vec3_sum_abs(from_eye);
-    }
-    t->gx = umb_vec3_dot(f->normal, map->ray_x) * scale;
-    t->gy = umb_vec3_dot(f->normal, map->ray_y) * scale;
-    t->g0 = (umb_vec3_dot(f->normal, map->ray_0) - offset) * scale;
-    double terms = fabs(t->gx) * map->width + fabs(t->gy) * map->height + fabs(t->g0);
-    t->g0 -= 16.0 * UMB_U * f->size * (map->ray_size + offset_size) * fabs(scale) + 8.0 * UMB_U * terms;
-    return true;
 }
 
 /* Where an edge meets the cut depth. Operands are in one order whatever the edge's direction, so that a
@@ -241,7 +187,7 @@ static void find_sides(umb_depth_triangle *t, const umb_raster_map *map, const u
     }
 }
 
-static void add_triangle(umb_silhouette *s, const umb_raster_map *map, const face *f,
+static void add_triangle(umb_silhouette *s, const umb_raster_map *map, const umb_face *f,
                          const uint32_t corner[3], const box *image)
 {
     umb_depth_triangle *t = &s->triangles[s->triangle_count++];
@@ -258,10 +204,11 @@ static void add_triangle(umb_silhouette *s, const umb_raster_map *map, const fac
         }
     }
     s->most = most > s->most ? most : s->most;
-    if (!plane_nearness(t, map, f, s->world[corner[0]])) {
-        t->gx = t->gy = 0.0;
-        t->g0 = t->least;
-    }
+    umb_plane_nearness plane = {0.0, 0.0, t->least, 0.0};
+    (void)umb_face_nearness(map, f, s->world[corner[0]], &plane);
+    t->gx = plane.gx;
+    t->gy = plane.gy;
+    t->g0 = plane.g0 - plane.error;
     t->side_count = 0;
     if (kept(s, corner[0]) && kept(s, corner[1]) && kept(s, corner[2])) {
         const umb_raster_point *const p[3] = {&s->points[corner[0]], &s->points[corner[1]],
@@ -279,7 +226,7 @@ static void find_front(umb_silhouette *s, const umb_raster_map *map, const umb_o
     const umb_mesh *mesh = o->mesh;
     for (uint32_t i = 0; i < mesh->triangle_count; ++i) {
         const uint32_t *corner = mesh->triangles[i];
-        face f = look_at_face(s, map, corner);
+        umb_face f = umb_face_of(map, s->world[corner[0]], s->world[corner[1]], s->world[corner[2]]);
         s->sides[i] = side_of(&f, o->mirrored, mesh->two_sided[i] != 0);
         if (s->sides[i] == 0) {
             continue;
