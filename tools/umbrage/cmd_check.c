@@ -65,7 +65,7 @@ static bool note_wrong(check *c, uint32_t row, uint32_t object, const truth_resu
 
 static void count(tally *t, bool witness, bool confirmed, bool hidden)
 {
-    t->visible += witness;
+    t->visible += witness && (confirmed || !hidden);
     t->wrong += witness && hidden && confirmed;
     t->unconfirmed += witness && hidden && !confirmed;
 }
