@@ -1,11 +1,12 @@
 /* A stand-in for a fuzzer's driver, for builds without one: feeds LLVMFuzzerTestOneInput every file of
- * a corpus folder, then cut and damaged copies of it, always the same ones. It finds less than a fuzzer
- * and runs in every test, under sanitizers too. */
+ * a corpus folder, then cut and damaged copies of it, the same ones in the same order each time, as many
+ * as fit into a few seconds. It finds less than a fuzzer and runs in every test, under sanitizers too. */
 #include <dirent.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
@@ -51,20 +52,36 @@ static void damage(uint8_t *data, size_t size)
     }
 }
 
-static void mutate(const uint8_t *data, size_t size, uint32_t rounds)
+static double now(void)
+{
+    struct timespec t;
+    (void)clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
+}
+
+/* How much is done with one file: rounds of two copies, stopped early after so many seconds. */
+typedef struct effort {
+    uint32_t rounds;
+    double seconds;
+} effort;
+
+static uint32_t mutate(const uint8_t *data, size_t size, effort e)
 {
     uint8_t *copy = malloc(size > 0 ? size : 1);
     if (copy == NULL) {
-        return;
+        return 0;
     }
     feed(data, size);
-    for (uint32_t i = 0; i < rounds && size > 0; ++i) {
+    double end = now() + e.seconds;
+    uint32_t round = 0;
+    for (; round < e.rounds && size > 0 && now() < end; ++round) {
         feed(data, below(size));
         memcpy(copy, data, size);
         damage(copy, size);
         feed(copy, size);
     }
     free(copy);
+    return 2 * round;
 }
 
 static uint8_t *read_file(const char *path, size_t *size)
@@ -94,22 +111,29 @@ static int only_files(const struct dirent *entry)
     return entry->d_name[0] != '.';
 }
 
+static effort wanted(void)
+{
+    const char *size = getenv("UMBRAGE_TEST_SIZE");
+    if (size != NULL && strcmp(size, "full") == 0) {
+        return (effort){20000, 300.0};
+    }
+    return size != NULL && strcmp(size, "small") == 0 ? (effort){50, 5.0} : (effort){200, 8.0};
+}
+
 int main(int argc, char **argv)
 {
-    const char *size_name = getenv("UMBRAGE_TEST_SIZE");
-    uint32_t rounds = size_name != NULL && strcmp(size_name, "small") == 0 ? 50 : 200;
-    if (size_name != NULL && strcmp(size_name, "full") == 0) {
-        rounds = 20000;
-    }
+    struct dirent **names = NULL;
+    int count = argc > 1 ? scandir(argv[1], &names, only_files, compare_names) : 0;
+    count = count > 0 ? count : 0;
+    effort each = wanted();
+    each.seconds /= count + 1;
+
     uint8_t noise[512];
     for (size_t i = 0; i < sizeof noise; ++i) {
         noise[i] = (uint8_t)below(256);
     }
-    mutate(noise, sizeof noise, rounds);
     feed(noise, 0);
-
-    struct dirent **names = NULL;
-    int count = argc > 1 ? scandir(argv[1], &names, only_files, compare_names) : 0;
+    uint32_t fed = mutate(noise, sizeof noise, each);
     for (int i = 0; i < count; ++i) {
         char path[4096];
         (void)snprintf(path, sizeof path, "%s/%s", argv[1], names[i]->d_name);
@@ -119,11 +143,11 @@ int main(int argc, char **argv)
             (void)fprintf(stderr, "%s: cannot be read\n", path);
             return 1;
         }
-        mutate(data, size, rounds);
+        fed += mutate(data, size, each);
         free(data);
         free(names[i]);
     }
     free(names);
-    printf("%d files of the corpus, %u damaged copies each\n", count > 0 ? count : 0, 2 * rounds);
+    printf("%d files of the corpus, %u damaged inputs\n", count, (unsigned)fed);
     return 0;
 }
