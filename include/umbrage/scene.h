@@ -90,7 +90,8 @@ UMB_API umb_result umb_scene_remove_occluder(umb_scene *scene, uint32_t occluder
 
 /* How static neighbours are joined. */
 typedef struct umb_weld_def {
-    uint32_t cluster_triangles; /* triangles of one welded occluder, about; 0: 128 */
+    uint32_t cluster_triangles; /* triangles of one piece of a welded surface, at most; solids of up to
+                                   sixteen times as many may stay whole; rings are not counted; 0: 16 */
     uint32_t ring;              /* how many rings of neighbouring triangles a cluster carries beyond its own,
                                    so that cuts between clusters are no cracks; 0: 1 */
     umb_tasks tasks;            /* for the search of T-junctions and the clustering */

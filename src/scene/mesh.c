@@ -225,6 +225,9 @@ static umb_mesh *pack(const umb_allocator *allocator, const mesh_builder *b, con
     return m;
 }
 
+/* A box of twelve triangles stays one part; what is open or bent is cut down to pairs. */
+static const umb_parts_rule PARTS = {2, 12};
+
 static umb_result create(const umb_allocator *allocator, const umb_shape_def *def, bool one_part, umb_mesh **out)
 {
     *out = NULL;
@@ -249,10 +252,10 @@ static umb_result create(const umb_allocator *allocator, const umb_shape_def *de
         umb_part whole = {bounds_of((const float(*)[3])b.positions, b.position_count), 1, 0,
                           b.triangle_count};
         const umb_part *parts = &whole;
-        const uint32_t *part_order = NULL;
+        uint32_t *part_order = NULL;
         if (b.triangle_count > 0 && !one_part) {
             parts = umb_mesh_parts_build(&scratch, (const float(*)[3])b.positions, triangles,
-                                         b.triangle_count, &part_count, &part_order);
+                                         b.triangle_count, PARTS, &part_count, &part_order);
         }
         if (!scratch.failed) {
             *out = pack(allocator, &b, edges, edge_count, parts, part_count, part_order);

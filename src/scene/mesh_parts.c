@@ -6,7 +6,6 @@
 
 #define BINS 16u
 #define KEEP_BELOW 0.8 /* parts must be this much smaller than what they refine */
-#define MAX_SOLID 12u  /* triangles of a part that may stay whole although it could be cut */
 #define STACK_SIZE 256u /* each cut leaves at most 7/8: 8/7^256 is far beyond 2^32 */
 
 typedef struct parts_builder {
@@ -150,7 +149,7 @@ static void link_parts(parts_builder *p)
 /* Drop what is below a small part unless its own parts together are smaller: the boxes of a solid's faces
  * say no more than the solid's box, those of a room's walls say much more than the room's. Going backwards,
  * children come before their parents; a negative area marks a part that becomes a leaf. */
-static void prune_parts(parts_builder *p, double *area)
+static void prune_parts(parts_builder *p, double *area, uint32_t most)
 {
     for (uint32_t i = p->part_count; i-- > 0;) {
         const umb_part *part = &p->parts[i];
@@ -159,7 +158,7 @@ static void prune_parts(parts_builder *p, double *area)
         if (part->skip != i + 1) {
             uint32_t second = p->parts[i + 1].skip;
             double below = fabs(area[i + 1]) + fabs(area[second]);
-            bool solid = p->ends[i] - p->begins[i] <= MAX_SOLID && !(below < KEEP_BELOW * own);
+            bool solid = p->ends[i] - p->begins[i] <= most && !(below < KEEP_BELOW * own);
             area[i] = solid ? -own : below;
         }
     }
@@ -194,8 +193,8 @@ static umb_aabb *triangle_boxes(umb_scratch *scratch, const float (*positions)[3
 }
 
 umb_part *umb_mesh_parts_build(umb_scratch *scratch, const float (*positions)[3],
-                               const uint32_t (*triangles)[3], uint32_t triangle_count, uint32_t *part_count,
-                               const uint32_t **part_order)
+                               const uint32_t (*triangles)[3], uint32_t triangle_count, umb_parts_rule rule,
+                               uint32_t *part_count, uint32_t **part_order)
 {
     umb_aabb *boxes = triangle_boxes(scratch, positions, triangles, triangle_count);
     size_t n = triangle_count;
@@ -222,7 +221,7 @@ umb_part *umb_mesh_parts_build(umb_scratch *scratch, const float (*positions)[3]
         depth -= 1;
         uint32_t begin = stack[depth][0], end = stack[depth][1];
         emit(&p, begin, end);
-        if (end - begin <= UMB_PART_TRIANGLES) {
+        if (end - begin <= rule.least) {
             continue;
         }
         uint32_t at = cut(&p, begin, end);
@@ -233,7 +232,7 @@ umb_part *umb_mesh_parts_build(umb_scratch *scratch, const float (*positions)[3]
         depth += 2;
     }
     link_parts(&p);
-    prune_parts(&p, areas);
+    prune_parts(&p, areas, rule.solid);
     *part_count = p.part_count;
     for (uint32_t i = 0; i < p.part_count; ++i) {
         p.parts[i].begin = p.begins[i];

@@ -2,7 +2,7 @@
  * weld_cluster.c; weld_group.c says how welds end. */
 #include "weld_soup.h"
 
-#define DEFAULT_CLUSTER 128u
+#define DEFAULT_CLUSTER 16u
 #define DEFAULT_RING 1u
 
 /* Splitting an edge can make triangles equal that were not: then they are matched once more. */

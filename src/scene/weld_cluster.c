@@ -17,12 +17,12 @@
 #include <pthread.h>
 #include <string.h>
 
-#include "base/sort.h"
+#include "mesh_parts.h"
 #include "weld_soup.h"
 
-#define BIG_OBJECT 4u /* an object of more clusters than this is cut too, though it touches no other */
-#define RING_LIMIT 4u /* a ring has at most this many times the triangles of a cluster (fans) */
-#define STACK_SIZE 64u /* the count of clusters halves with each cut */
+#define SMALL_GROUP 16u /* groups of up to so many clusters may stay whole; larger ones never do */
+#define RING_LIMIT 512u /* most triangles of a ring: fans */
+#define LEAST_CLUSTER 8u /* smaller ones cost more to draw than they bring nearer */
 
 typedef struct clusterer {
     umb_weld_soup *soup;
@@ -90,7 +90,7 @@ static bool choose_groups(clusterer *c)
         if (root != i) {
             c->group_of[i] = c->group_of[root];
         } else if (triangles[i] > 0 &&
-                   (members[i] > 1 || triangles[i] > (uint64_t)BIG_OBJECT * c->target)) {
+                   (members[i] > 1 || triangles[i] > (uint64_t)SMALL_GROUP * c->target)) {
             c->group_of[i] = c->group_count++;
             c->order_count += triangles[i];
         } else {
@@ -107,77 +107,51 @@ static uint32_t group_of_triangle(const clusterer *c, uint32_t t)
     return c->group_of[c->soup->triangles[t].object];
 }
 
-static float centre(const umb_weld_soup *soup, uint32_t t, int axis)
+/* Cut the triangles [begin, end) of one group into clusters: parts, as of an object's shape. A small solid
+ * is one cluster; a level's walls become clusters of their own, because an occluder that is there several
+ * times along a sight-line is only as near as the farthest. */
+static bool cut_group(clusterer *c, uint32_t group, uint32_t begin, uint32_t end)
 {
-    const uint32_t *v = soup->triangles[t].v;
-    const float(*p)[3] = (const float(*)[3])soup->positions;
-    return (float)(((double)p[v[0]][axis] + (double)p[v[1]][axis] + (double)p[v[2]][axis]) / 3.0);
-}
-
-static int longest_axis(const clusterer *c, uint32_t begin, uint32_t end)
-{
-    int best = 0;
-    double widest = -1.0;
-    for (int axis = 0; axis < 3; ++axis) {
-        float low = centre(c->soup, c->order[begin], axis), high = low;
-        for (uint32_t i = begin + 1; i < end; ++i) {
-            float x = centre(c->soup, c->order[i], axis);
-            low = x < low ? x : low;
-            high = x > high ? x : high;
-        }
-        if ((double)high - low > widest) {
-            widest = (double)high - low;
-            best = axis;
-        }
+    uint32_t n = end - begin, part_count = 0, *part_order = NULL;
+    uint32_t(*triangles)[3] = umb_scratch_get(c->scratch, n, sizeof *triangles);
+    uint32_t *order = umb_scratch_get(c->scratch, n, sizeof *order);
+    for (uint32_t i = 0; i < n && !c->scratch->failed; ++i) {
+        memcpy(triangles[i], c->soup->triangles[c->order[begin + i]].v, sizeof triangles[i]);
+        order[i] = c->order[begin + i];
     }
-    return best;
-}
-
-/* Cut the triangles [begin, end) of one group at medians, into clusters of about the target's size. */
-static void cut_group(clusterer *c, uint32_t group, uint32_t begin, uint32_t end, uint64_t *keys,
-                      uint64_t *key_scratch, uint32_t *value_scratch)
-{
-    struct {
-        uint32_t begin, end, clusters;
-    } stack[STACK_SIZE];
-    uint32_t depth = 1;
-    stack[0].begin = begin;
-    stack[0].end = end;
-    stack[0].clusters = (end - begin - 1) / c->target + 1;
-    while (depth > 0) {
-        depth -= 1;
-        uint32_t b = stack[depth].begin, e = stack[depth].end, n = stack[depth].clusters;
-        if (n == 1) {
-            c->starts[c->cluster_count] = b;
+    umb_parts_rule rule = {c->target < LEAST_CLUSTER ? c->target : LEAST_CLUSTER,
+                           n <= SMALL_GROUP * c->target ? n : c->target};
+    const umb_part *parts =
+        c->scratch->failed ? NULL
+                           : umb_mesh_parts_build(c->scratch, (const float(*)[3])c->soup->positions,
+                                                  (const uint32_t(*)[3])triangles, n, rule, &part_count,
+                                                  &part_order);
+    if (parts == NULL || c->scratch->failed) {
+        return false;
+    }
+    for (uint32_t i = 0; i < n; ++i) {
+        c->order[begin + i] = order[part_order[i]];
+    }
+    for (uint32_t i = 0; i < part_count; ++i) {
+        if (parts[i].skip == i + 1) {
+            c->starts[c->cluster_count] = begin + parts[i].begin;
             c->owners[c->cluster_count++] = group;
-            continue;
         }
-        int axis = longest_axis(c, b, e);
-        for (uint32_t i = b; i < e; ++i) {
-            keys[i - b] = umb_sort_float(centre(c->soup, c->order[i], axis));
-        }
-        umb_sort_keys(keys, c->order + b, key_scratch, value_scratch, e - b);
-        uint32_t left = n / 2, at = b + (uint32_t)((uint64_t)(e - b) * left / n);
-        stack[depth].begin = at;
-        stack[depth].clusters = n - left;
-        stack[depth + 1].begin = b;
-        stack[depth + 1].end = at;
-        stack[depth + 1].clusters = left;
-        depth += 2;
     }
+    umb_scratch_drop(c->scratch, (void *)(uintptr_t)parts);
+    umb_scratch_drop(c->scratch, part_order);
+    umb_scratch_drop(c->scratch, order);
+    umb_scratch_drop(c->scratch, triangles);
+    return true;
 }
 
 static bool cut_groups(clusterer *c)
 {
     size_t n = c->order_count;
     uint32_t *group_starts = umb_scratch_get_zero(c->scratch, (size_t)c->group_count + 2, sizeof *group_starts);
-    uint64_t *keys = umb_scratch_get(c->scratch, n, sizeof *keys);
-    uint64_t *key_scratch = umb_scratch_get(c->scratch, n, sizeof *key_scratch);
-    uint32_t *value_scratch = umb_scratch_get(c->scratch, n, sizeof *value_scratch);
-    size_t most = n / c->target + c->group_count + 1;
     c->order = umb_scratch_get(c->scratch, n, sizeof *c->order);
-    c->starts = umb_scratch_get(c->scratch, most + 1, sizeof *c->starts);
-    c->owners = umb_scratch_get(c->scratch, most, sizeof *c->owners);
+    c->starts = umb_scratch_get(c->scratch, n + 1, sizeof *c->starts);
+    c->owners = umb_scratch_get(c->scratch, n, sizeof *c->owners);
     if (c->scratch->failed) {
         return false;
     }
@@ -195,13 +169,12 @@ static bool cut_groups(clusterer *c)
         }
     }
     for (uint32_t g = 0; g < c->group_count; ++g) {
-        cut_group(c, g, group_starts[g], group_starts[g + 1], keys, key_scratch, value_scratch);
+        if (!cut_group(c, g, group_starts[g], group_starts[g + 1])) {
+            return false;
+        }
     }
     c->starts[c->cluster_count] = c->order_count;
     umb_scratch_drop(c->scratch, group_starts);
-    umb_scratch_drop(c->scratch, keys);
-    umb_scratch_drop(c->scratch, key_scratch);
-    umb_scratch_drop(c->scratch, value_scratch);
     return true;
 }
 
@@ -258,7 +231,7 @@ static bool add_rings(clusterer *c)
     uint64_t total = 0;
     for (uint32_t k = 0; k < c->cluster_count; ++k) {
         uint32_t own = c->starts[k + 1] - c->starts[k];
-        uint64_t limit = (uint64_t)own + (uint64_t)RING_LIMIT * c->target;
+        uint64_t limit = (uint64_t)own + RING_LIMIT;
         if (total + limit > UINT32_MAX ||
             !umb_memory_reserve(c->soup->allocator, (void **)&c->lists, &c->list_capacity,
                                 (size_t)(total + limit), sizeof *c->lists)) {
