@@ -213,6 +213,14 @@ static void test_nothing_to_save(void **state)
     size_t size = 7;
     assert_int_equal(umb_capture_save(f.culler, NULL, 0, &size), UMB_ERROR_STATE);
     assert_int_equal(size, 0);
+    umb_view first = random_view(&d);
+    umb_visible_set answer;
+    assert_int_equal(umb_cull(f.culler, &first, &answer), UMB_OK);
+    assert_int_equal(umb_capture_save(f.culler, NULL, 0, &size), UMB_OK);
+    assert_int_equal(umb_scene_remove_object(f.scene, 1), UMB_OK);
+    assert_int_equal(umb_capture_save(f.culler, NULL, 0, &size), UMB_OK); /* not committed yet */
+    assert_int_equal(umb_scene_commit(f.scene), UMB_OK);
+    assert_int_equal(umb_capture_save(f.culler, NULL, 0, &size), UMB_ERROR_STATE);
     free_frame(&f);
     umb_scene *scene;
     umb_index *index;

@@ -41,6 +41,7 @@ struct umb_culler {
     uint32_t count;
     bool answered;
     umb_view view; /* of the last answer */
+    uint64_t version; /* of the scene that it was given for */
 };
 
 /* One frame's state. */
@@ -385,6 +386,7 @@ umb_result umb_cull(umb_culler *c, const umb_view *view, umb_visible_set *out)
     }
     w.stats.visible = c->count;
     c->view = *view;
+    c->version = w.scene->version;
     c->answered = true;
     out->objects = c->objects;
     out->inside = c->inside;
@@ -438,5 +440,6 @@ const umb_view *umb_culler_last_view(const umb_culler *culler, const uint32_t **
 {
     *ids = culler->objects;
     *count = culler->count;
-    return culler->answered ? &culler->view : NULL;
+    bool current = umb_scene_committed(umb_index_scene(culler->index))->version == culler->version;
+    return culler->answered && current ? &culler->view : NULL;
 }
