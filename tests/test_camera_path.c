@@ -38,7 +38,9 @@ static void rows(void **state)
         {"1,2,3,4,5,6", 1},
         {"1,2,3,4,5,6\r\n-1.5,2e3,+3,4,5,6\r\n", 2},
         {"ex,ey,ez,tx,ty,tz\n1,2,3,4,5,6\n", 1},
-        {"\xEF\xBB\xBF" "ex,ey,ez,tx,ty,tz\n1,2,3,4,5,6\n", 1},
+        {"\xEF\xBB\xBF"
+         "ex,ey,ez,tx,ty,tz\n1,2,3,4,5,6\n",
+         1},
         {"# a path\n\n  \n 1 , 2 ,\t3, 4, 5, 6 \n\n", 1},
         {"x\ny\n1,2,3,4,5,6\n\n2,3,4,5,6,7\n", 2},
     };

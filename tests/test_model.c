@@ -1,5 +1,5 @@
-/* The model: what is dropped and counted, bounds, rebasing without a rounding, splitting without a loss.
- * References are the definitions, written down as slowly as they read. */
+/* The model: what is dropped and counted, bounds, rebasing without a rounding, splitting without
+ * a loss. References are the definitions, written down as slowly as they read. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -17,8 +17,8 @@
 
 static const umb_transform identity = {{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
 
-static uint32_t add(model *m, const float *positions, uint32_t position_count, const uint32_t *indices,
-                    uint32_t triangle_count)
+static uint32_t add(model *m, const float *positions, uint32_t position_count,
+                    const uint32_t *indices, uint32_t triangle_count)
 {
     model_mesh mesh = {.positions = (float *)(uintptr_t)positions,
                        .indices = (uint32_t *)(uintptr_t)indices,
@@ -86,7 +86,8 @@ static void split_and_inverted_cube(void **state)
 static void drops(void **state)
 {
     (void)state;
-    float positions[6][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {NAN, 0, 0}, {0, INFINITY, 0}, {9, 9, 9}};
+    float positions[6][3] = {{0, 0, 0},   {1, 0, 0},        {0, 1, 0},
+                             {NAN, 0, 0}, {0, INFINITY, 0}, {9, 9, 9}};
     static const uint32_t indices[15] = {0, 1, 2, 0, 1, 3, 0, 4, 2, 0, 1, 6, 0, 1, UINT32_MAX};
     model *m = model_create();
     add(m, positions[0], 6, indices, 5);
@@ -120,7 +121,8 @@ static bool zero_area_of_integers(int64_t p[3][3])
 {
     for (int u = 0; u < 3; ++u) {
         int v = (u + 1) % 3;
-        if ((wide)(p[1][u] - p[0][u]) * (p[2][v] - p[0][v]) != (wide)(p[1][v] - p[0][v]) * (p[2][u] - p[0][u])) {
+        if ((wide)(p[1][u] - p[0][u]) * (p[2][v] - p[0][v]) !=
+            (wide)(p[1][v] - p[0][v]) * (p[2][u] - p[0][u])) {
             return false;
         }
     }
@@ -138,7 +140,8 @@ static void zero_area_is_exact(void **state)
         float f[3][3];
         for (int k = 0; k < 3; ++k) {
             int shift = (int)random_below(&random, 36);
-            int64_t base = (int64_t)random_below(&random, 1u << 10) * ((int64_t)1 << random_below(&random, 36));
+            int64_t base = (int64_t)random_below(&random, 1u << 10) *
+                           ((int64_t)1 << random_below(&random, 36));
             int64_t step = ((int64_t)random_below(&random, 64) - 32) * ((int64_t)1 << shift);
             p[0][k] = base;
             p[1][k] = base + step;
@@ -151,7 +154,8 @@ static void zero_area_is_exact(void **state)
                 direction[k] = (int64_t)random_below(&random, 1024) - 512;
             }
             for (int i = 0; i < 3; ++i) {
-                int64_t scale = (int64_t)(1 + random_below(&random, 1023)) << random_below(&random, 40);
+                int64_t scale = (int64_t)(1 + random_below(&random, 1023))
+                                << random_below(&random, 40);
                 for (int k = 0; k < 3; ++k) {
                     p[i][k] = direction[k] * scale;
                 }
@@ -206,8 +210,9 @@ static model_faults slow_faults(int64_t (*points)[3], const uint32_t *indices, u
             for (uint32_t r = 0; r < 3; ++r) {
                 same = same || (good[o][0] == good[t][r] && good[o][1] == good[t][(r + 1) % 3] &&
                                 good[o][2] == good[t][(r + 2) % 3]);
-                opposite = opposite || (good[o][0] == good[t][r] && good[o][2] == good[t][(r + 1) % 3] &&
-                                        good[o][1] == good[t][(r + 2) % 3]);
+                opposite = opposite ||
+                           (good[o][0] == good[t][r] && good[o][2] == good[t][(r + 1) % 3] &&
+                            good[o][1] == good[t][(r + 2) % 3]);
             }
         }
         f.duplicate += same;
@@ -328,7 +333,8 @@ static void world_vertices_and_bounds(void **state)
         for (int i = 0; i < 3; ++i) {
             int j = (i + 1) % 3;
             int k = (i + 2) % 3;
-            determinant += t.m[0][i] * ((double)t.m[1][j] * t.m[2][k] - (double)t.m[1][k] * t.m[2][j]);
+            determinant += t.m[0][i] *
+                           ((double)t.m[1][j] * t.m[2][k] - (double)t.m[1][k] * t.m[2][j]);
         }
         if (fabs(determinant) > 1e-6) {
             assert_int_equal(model_mirrored(o), determinant < 0.0);
@@ -352,12 +358,13 @@ static void rebasing_moves_nothing(void **state)
         float positions[30][3];
         uint32_t indices[30];
         double extent = fabs(random_power(&random, -1.0, 3.0));
-        /* 0: vertices far off, identity. 1: a translation far off. 2: both halves. 3: near. 4: a translation
-           that keeps no bits for what the vertices need. */
+        /* 0: vertices far off, identity. 1: a translation far off. 2: both halves. 3: near. 4: a
+         * translation that keeps no bits for what the vertices need. */
         int kind = (int)random_below(&random, 5);
         umb_transform t = identity;
         for (int k = 0; k < 3; ++k) {
-            centre[k] = extent * (kind == 3 ? random_in(&random, -3.0, 3.0) : random_power(&random, 1.2, 3.0));
+            centre[k] = extent * (kind == 3 ? random_in(&random, -3.0, 3.0)
+                                            : random_power(&random, 1.2, 3.0));
             float share = kind == 0 ? 0.0f : kind == 1 ? 1.0f : kind == 2 ? 0.5f : 0.0f;
             t.m[k][3] = (float)(share * centre[k]) + (kind == 4 ? 0.1f : 0.0f);
             if (kind == 1) {
@@ -366,7 +373,8 @@ static void rebasing_moves_nothing(void **state)
         }
         for (uint32_t v = 0; v < 30; ++v) {
             for (int k = 0; k < 3; ++k) {
-                positions[v][k] = (float)(centre[k] + random_in(&random, -0.5, 0.5) * extent) - t.m[k][3];
+                positions[v][k] = (float)(centre[k] + random_in(&random, -0.5, 0.5) * extent) -
+                                  t.m[k][3];
             }
             indices[v] = v;
         }
@@ -418,7 +426,8 @@ static float (*triangle_soup(const model *m, uint32_t first, uint32_t end, uint3
     for (uint32_t o = first; o < end; ++o) {
         const model_mesh *mesh = &m->meshes[m->objects[o].mesh];
         for (uint32_t i = 0; i < 3 * mesh->triangle_count; ++i) {
-            model_world_vertex(m, &m->objects[o], mesh->indices[i], soup[at + i / 3] + 3 * (size_t)(i % 3));
+            model_world_vertex(m, &m->objects[o], mesh->indices[i],
+                               soup[at + i / 3] + 3 * (size_t)(i % 3));
         }
         at += mesh->triangle_count;
     }

@@ -1,5 +1,5 @@
-/* Polygons with holes: as many triangles as the corners say, none turned over, and every point of the
- * plane covered as often as the rings wind around it. */
+/* Polygons with holes: as many triangles as the corners say, none turned over, and every point
+ * of the plane covered as often as the rings wind around it. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -77,8 +77,8 @@ static void check(const rings *r, uint64_t *random, double reach)
 }
 
 /* A star around a centre: corners at growing angles, so that it never crosses itself. */
-static void star(rings *r, uint64_t *random, const double centre[2], double small, double large, uint32_t corners,
-                 bool clockwise, double grid)
+static void star(rings *r, uint64_t *random, const double centre[2], double small, double large,
+                 uint32_t corners, bool clockwise, double grid)
 {
     uint32_t first = r->starts[r->count];
     for (uint32_t i = 0; i < corners; ++i) {
@@ -101,8 +101,8 @@ static void random_stars(void **state)
         const double origin[2] = {0.0, 0.0};
         uint32_t corners = 5 + random_below(&random, 60);
         star(&r, &random, origin, 60.0, 100.0, corners, false, 0x1p-16);
-        /* The star's inner disc is 60 wide where its corners stand at less than half a turn: holes keep
-           to a disc that every chord stays out of. */
+        /* The star's inner disc is 60 wide where its corners stand at less than half a turn:
+         * holes keep to a disc that every chord stays out of. */
         double room = 60.0 * cos(6.283185307179586 / corners) - 1.0;
         uint32_t holes = room > 12.0 ? random_below(&random, 5) : 0;
         for (uint32_t h = 0; h < holes; ++h) {
@@ -110,8 +110,8 @@ static void random_stars(void **state)
             double distance = holes == 1 ? 0.0 : 0.5 * room;
             double size = holes == 1 ? room : holes == 2 ? 0.45 * room : 0.33 * room;
             const double centre[2] = {distance * cos(angle), distance * sin(angle)};
-            star(&r, &random, centre, 0.3 * size, size, 3 + random_below(&random, 20), random_below(&random, 2) == 0,
-                 0x1p-16);
+            star(&r, &random, centre, 0.3 * size, size, 3 + random_below(&random, 20),
+                 random_below(&random, 2) == 0, 0x1p-16);
         }
         check(&r, &random, 110.0);
     }
@@ -168,7 +168,8 @@ static void any_plane(void **state)
             u[k] = rint(random_in(&random, -8.0, 8.0));
             v[k] = rint(random_in(&random, -8.0, 8.0));
         }
-        const double normal[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
+        const double normal[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2],
+                                  u[0] * v[1] - u[1] * v[0]};
         if (normal[0] == 0.0 && normal[1] == 0.0 && normal[2] == 0.0) {
             continue;
         }
@@ -213,7 +214,8 @@ static void no_polygons(void **state)
             uint32_t corners = random_below(&random, 20);
             for (uint32_t i = 0; i < corners; ++i) {
                 for (int k = 0; k < 3; ++k) {
-                    r.corners[r.starts[ring] + i][k] = random_below(&random, round % 2 != 0 ? 4 : 1000);
+                    r.corners[r.starts[ring] + i][k] = random_below(&random,
+                                                                    round % 2 != 0 ? 4 : 1000);
                 }
             }
             add_ring(&r, corners);
@@ -239,7 +241,9 @@ static void no_polygons(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(random_stars), cmocka_unit_test(combs_and_grids), cmocka_unit_test(any_plane),
+        cmocka_unit_test(random_stars),
+        cmocka_unit_test(combs_and_grids),
+        cmocka_unit_test(any_plane),
         cmocka_unit_test(no_polygons),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

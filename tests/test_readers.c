@@ -1,5 +1,5 @@
-/* Every reader on small files made here, on damaged copies of them, and on real scenes whose counts are
- * known from other tools. */
+/* Every reader on small files made here, on damaged copies of them, and on real scenes whose
+ * counts are known from other tools. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -138,8 +138,8 @@ static void quake3_clusters(void **state)
     model_free(m);
 }
 
-/* Two patches that share a border, listed in opposite directions and from different sides: the floats on
- * the border are the same. */
+/* Two patches that share a border, listed in opposite directions and from different sides: the
+ * floats on the border are the same. */
 static void patch_borders_agree(void **state)
 {
     (void)state;
@@ -157,7 +157,8 @@ static void patch_borders_agree(void **state)
         }
         model *m = read_q3bsp(map.bytes, map.size, "it", &defaults, &error);
         assert_non_null(m);
-        /* Vertices of the patch's grid in the order of their first use: find those that lie on the curve. */
+        /* Vertices of the patch's grid in the order of their first use: find those that lie on
+         * the curve. */
         const model_mesh *mesh = mesh_of(m, 0);
         for (int i = 0; i < 5; ++i) {
             float t = 0.25f * (float)i;
@@ -166,8 +167,8 @@ static void patch_borders_agree(void **state)
                 const float *p = mesh->positions + 3 * (size_t)v;
                 double distance = 0.0;
                 for (int k = 0; k < 3; ++k) {
-                    double at = (1.0 - t) * (1.0 - t) * border[0][k] + 2.0 * t * (1.0 - t) * border[1][k] +
-                                (double)t * t * border[2][k];
+                    double at = (1.0 - t) * (1.0 - t) * border[0][k] +
+                                2.0 * t * (1.0 - t) * border[1][k] + (double)t * t * border[2][k];
                     distance += fabs(at - p[k]);
                 }
                 if (distance < 1e-4) {
@@ -183,8 +184,8 @@ static void patch_borders_agree(void **state)
     assert_memory_equal(seen[0], seen[1], sizeof seen[0]);
 }
 
-typedef model *memory_reader(const uint8_t *data, size_t size, const char *name, const model_options *options,
-                             umb_error *error);
+typedef model *memory_reader(const uint8_t *data, size_t size, const char *name,
+                             const model_options *options, umb_error *error);
 
 /* Cut at every length, and every 32 bits of it set to what readers trip over. Exact blocks, so that
  * sanitizers see a byte too far. */
@@ -236,12 +237,17 @@ static const char city[] =
     "\"part\":{\"type\":\"BuildingPart\",\"parents\":[\"house\"],\"geometry\":["
     "{\"type\":\"MultiSurface\",\"lod\":\"0\",\"boundaries\":[[[0,1,2]]]},"
     "{\"type\":\"Solid\",\"lod\":\"2.2\",\"boundaries\":[[[[0,1,2,3],[4,5,6,7]],[[0,0,1,1,2]]]],"
-    "\"semantics\":{\"surfaces\":[{\"type\":\"RoofSurface\"},{\"type\":\"Window\"}],\"values\":[[0,1]]}}]},"
+    "\"semantics\":{\"surfaces\":[{\"type\":\"RoofSurface\"},{\"type\":\"Window\"}],\"values\":[[0,"
+    "1]]}}]},"
     "\"sign\":{\"type\":\"CityFurniture\",\"geometry\":[{\"type\":\"MultiSurface\",\"lod\":1,"
-    "\"boundaries\":[[[0,1,2]],[[1,2,3]],[[2,3,0]]],\"material\":{\"day\":{\"values\":[0,1,null]}}}]},"
-    "\"line\":{\"type\":\"Road\",\"geometry\":[{\"type\":\"MultiLineString\",\"lod\":1,\"boundaries\":[[0,1]]}]}},"
-    "\"appearance\":{\"materials\":[{\"name\":\"a\",\"transparency\":0.0},{\"name\":\"b\",\"transparency\":0.5}]},"
-    "\"vertices\":[[0,0,0],[10000,0,0],[10000,10000,0],[0,10000,0],[2000,2000,0],[2000,4000,0],[4000,4000,0],"
+    "\"boundaries\":[[[0,1,2]],[[1,2,3]],[[2,3,0]]],\"material\":{\"day\":{\"values\":[0,1,null]}}}"
+    "]},"
+    "\"line\":{\"type\":\"Road\",\"geometry\":[{\"type\":\"MultiLineString\",\"lod\":1,"
+    "\"boundaries\":[[0,1]]}]}},"
+    "\"appearance\":{\"materials\":[{\"name\":\"a\",\"transparency\":0.0},{\"name\":\"b\","
+    "\"transparency\":0.5}]},"
+    "\"vertices\":[[0,0,0],[10000,0,0],[10000,10000,0],[0,10000,0],[2000,2000,0],[2000,4000,0],["
+    "4000,4000,0],"
     "[4000,2000,0]]}";
 
 static void city_parts(void **state)
@@ -269,7 +275,8 @@ static void city_parts(void **state)
         area += n[2];
     }
     assert_true(area == 2.0 * (100.0 - 4.0));
-    /* Narrowed after the offset: a float at 447000 steps 1/32 m, so 0.125 would survive but 0.001 not. */
+    /* Narrowed after the offset: a float at 447000 steps 1/32 m, so 0.125 would survive but
+     * 0.001 not. */
     assert_true(m->origin[0] != 0.0 && m->origin[1] != 0.0 && m->origin[2] == 0.0);
     assert_true(m->bounds.min[0] + m->origin[0] == 85000.125);
     assert_true(m->bounds.max[1] + m->origin[1] == 447010.0);
@@ -281,18 +288,29 @@ static void damaged_cities(void **state)
 {
     (void)state;
     static const char *const wrong[] = {
-        "", "{", "[]", "null", "{}", "{\"type\":\"CityJSON\"}", "{\"type\":7,\"vertices\":[]}",
+        "",
+        "{",
+        "[]",
+        "null",
+        "{}",
+        "{\"type\":\"CityJSON\"}",
+        "{\"type\":7,\"vertices\":[]}",
         "{\"type\":\"CityJSON\",\"vertices\":[[1,2]],\"CityObjects\":{}}",
-        "{\"type\":\"CityJSON\",\"vertices\":[],\"transform\":{\"scale\":[1,1]},\"CityObjects\":{}}",
-        "{\"type\":\"CityJSON\",\"vertices\":[],\"CityObjects\":{\"a\":{\"geometry\":[{\"type\":\"Solid\","
+        "{\"type\":\"CityJSON\",\"vertices\":[],\"transform\":{\"scale\":[1,1]},\"CityObjects\":{}"
+        "}",
+        "{\"type\":\"CityJSON\",\"vertices\":[],\"CityObjects\":{\"a\":{\"geometry\":[{\"type\":"
+        "\"Solid\","
         "\"boundaries\":7}]}}}",
-        "{\"type\":\"CityJSON\",\"vertices\":[],\"CityObjects\":{\"a\":{\"geometry\":[{\"type\":\"MultiSurface\","
+        "{\"type\":\"CityJSON\",\"vertices\":[],\"CityObjects\":{\"a\":{\"geometry\":[{\"type\":"
+        "\"MultiSurface\","
         "\"boundaries\":[[[0,1,2]]]}]}}}",
-        "{\"type\":\"CityJSON\",\"vertices\":[[0,0,0]],\"CityObjects\":{\"a\":{\"geometry\":[{\"type\":"
+        "{\"type\":\"CityJSON\",\"vertices\":[[0,0,0]],\"CityObjects\":{\"a\":{\"geometry\":[{"
+        "\"type\":"
         "\"MultiSurface\",\"boundaries\":[[[-1,0,1.5]]]}]}}}"};
     umb_error error;
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; ++i) {
-        model *m = read_cityjson((const uint8_t *)wrong[i], strlen(wrong[i]), "it", &defaults, &error);
+        model *m = read_cityjson((const uint8_t *)wrong[i], strlen(wrong[i]), "it", &defaults,
+                                 &error);
         assert_refused(m, &error);
     }
     for (size_t cut = 0; cut < strlen(city); cut += 7) {
@@ -325,9 +343,10 @@ static const char *in_folder(const char *name)
 static int remove_folder(void **state)
 {
     (void)state;
-    static const char *const names[] = {"it.obj", "it.mtl", "it.ply", "it.stl", "it.ac", "it.gltf", "it.bin",
-                                        "it.bsp", "it.pk3", "it.glb", "far.obj", "it.city.json", "it.xyz",
-                                        "holes.png", "full.png", "plain.png", "four.rgb", "three.rgb"};
+    static const char *const names[] = {
+        "it.obj", "it.mtl",    "it.ply",   "it.stl",    "it.ac",    "it.gltf",
+        "it.bin", "it.bsp",    "it.pk3",   "it.glb",    "far.obj",  "it.city.json",
+        "it.xyz", "holes.png", "full.png", "plain.png", "four.rgb", "three.rgb"};
     for (size_t i = 0; i < sizeof names / sizeof names[0]; ++i) {
         (void)unlink(in_folder(names[i]));
     }
@@ -364,9 +383,10 @@ static void obj_groups_and_materials(void **state)
 {
     (void)state;
     write_text("it.mtl", "newmtl wall\nd 1\nnewmtl glass\nd 0.4\n");
-    model *m = load(write_text("it.obj", "mtllib it.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\n"
-                                         "o first\nusemtl wall\nf 1 2 3 4\nusemtl glass\nf 1 2 5\n"
-                                         "o second\nusemtl wall\nf 2 3 5\n"));
+    model *m = load(write_text("it.obj",
+                               "mtllib it.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\n"
+                               "o first\nusemtl wall\nf 1 2 3 4\nusemtl glass\nf 1 2 5\n"
+                               "o second\nusemtl wall\nf 2 3 5\n"));
     assert_int_equal(m->object_count, 3);
     assert_int_equal(m->triangles, 4);
     assert_string_equal(m->objects[0].name, "first");
@@ -383,20 +403,24 @@ static void write_png(const char *name, bool alpha, uint8_t value)
     uint8_t opaque[12] = {0};
     png_image image = {.version = PNG_IMAGE_VERSION, .width = 2, .height = 2};
     image.format = alpha ? PNG_FORMAT_RGBA : PNG_FORMAT_RGB;
-    assert_true(png_image_write_to_file(&image, in_folder(name), 0, alpha ? pixels : opaque, 0, NULL));
+    assert_true(
+        png_image_write_to_file(&image, in_folder(name), 0, alpha ? pixels : opaque, 0, NULL));
 }
 
-/* A picture with holes makes its surface open; a full one does not, nor does one that is not there. */
+/* A picture with holes makes its surface open; a full one does not, nor does one that is not
+ * there. */
 static void cut_out_textures(void **state)
 {
     (void)state;
     write_png("holes.png", true, 0);
     write_png("full.png", true, 255);
     write_png("plain.png", false, 0);
-    static const uint8_t sgi[2][12] = {{1, 0xDA, 0, 1, 0, 3, 0, 1, 0, 1, 0, 4}, {1, 0xDA, 0, 1, 0, 3, 0, 1, 0, 1, 0, 3}};
+    static const uint8_t sgi[2][12] = {{1, 0xDA, 0, 1, 0, 3, 0, 1, 0, 1, 0, 4},
+                                       {1, 0xDA, 0, 1, 0, 3, 0, 1, 0, 1, 0, 3}};
     write_file("four.rgb", sgi[0], 12);
     write_file("three.rgb", sgi[1], 12);
-    static const char *const pictures[] = {"holes.png", "full.png", "plain.png", "four.rgb", "three.rgb", "gone.png"};
+    static const char *const pictures[] = {"holes.png", "full.png",  "plain.png",
+                                           "four.rgb",  "three.rgb", "gone.png"};
     char text[512] = "";
     for (size_t i = 0; i < 6; ++i) {
         sprintf(text + strlen(text), "newmtl m%zu\nmap_Kd %s\n", i, pictures[i]);
@@ -418,9 +442,10 @@ static void cut_out_textures(void **state)
 static void far_obj(void **state)
 {
     (void)state;
-    model *m = load(write_text("far.obj", "v 85000.001 447000.002 1.5 0.5 0.5 0.5\nv 85000.002 447000.002 1.5\n"
-                                          "v 85010.000 447000.000 1.5\nv 85000.000 447010.000 2.5\n"
-                                          "o a\nf 1 2 4\nf 2 3 4\n"));
+    model *m = load(
+        write_text("far.obj", "v 85000.001 447000.002 1.5 0.5 0.5 0.5\nv 85000.002 447000.002 1.5\n"
+                              "v 85010.000 447000.000 1.5\nv 85000.000 447010.000 2.5\n"
+                              "o a\nf 1 2 4\nf 2 3 4\n"));
     static const double expected[4][3] = {{85000.001, 447000.002, 1.5},
                                           {85000.002, 447000.002, 1.5},
                                           {85010.0, 447000.0, 1.5},
@@ -459,7 +484,8 @@ static void gltf_instances(void **state)
         "{\"name\":\"a\",\"mesh\":0},"
         "{\"name\":\"b\",\"mesh\":0,\"scale\":[-1,1,1],\"translation\":[5,0,0],\"children\":[3]},"
         "{\"name\":\"c\",\"mesh\":1}],"
-        "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0},\"indices\":1,\"material\":0},"
+        "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0},\"indices\":1,\"material\":"
+        "0},"
         "{\"attributes\":{\"POSITION\":0},\"indices\":2,\"mode\":1}]},"
         "{\"primitives\":[{\"attributes\":{\"POSITION\":0},\"indices\":1,\"material\":1}]}],"
         "\"materials\":[{\"doubleSided\":true},{\"alphaMode\":\"MASK\"}],"
@@ -469,7 +495,8 @@ static void gltf_instances(void **state)
         "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\","
         "\"min\":[0,0,0],\"max\":[1,1,0]},"
         "{\"bufferView\":1,\"componentType\":5123,\"count\":3,\"type\":\"SCALAR\"},"
-        "{\"bufferView\":1,\"byteOffset\":6,\"componentType\":5123,\"count\":2,\"type\":\"SCALAR\"}]}"));
+        "{\"bufferView\":1,\"byteOffset\":6,\"componentType\":5123,\"count\":2,\"type\":\"SCALAR\"}"
+        "]}"));
     assert_int_equal(m->object_count, 5);
     assert_int_equal(m->mesh_count, 2);
     assert_int_equal(m->triangles, 3);
@@ -489,25 +516,30 @@ static void gltf_instances(void **state)
 static void other_formats(void **state)
 {
     (void)state;
-    model *m = load(write_text("it.ply", "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\n"
-                                         "property float y\nproperty float z\nelement face 1\n"
-                                         "property list uchar int vertex_indices\nend_header\n"
-                                         "0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n"));
+    model *m = load(write_text("it.ply",
+                               "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\n"
+                               "property float y\nproperty float z\nelement face 1\n"
+                               "property list uchar int vertex_indices\nend_header\n"
+                               "0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n"));
     assert_int_equal(m->triangles, 2);
     model_free(m);
-    m = load(write_text("it.stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n"
-                                  "vertex 0 1 0\nendloop\nendfacet\nendsolid a\n"));
+    m = load(write_text("it.stl",
+                        "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n"
+                        "vertex 0 1 0\nendloop\nendfacet\nendsolid a\n"));
     assert_int_equal(m->triangles, 1);
     model_free(m);
     m = load(write_text(
         "it.ac", "AC3Db\nMATERIAL \"a\" rgb 1 1 1 amb 0 0 0 emis 0 0 0 spec 0 0 0 shi 0 trans 0\n"
                  "MATERIAL \"b\" rgb 1 1 1 amb 0 0 0 emis 0 0 0 spec 0 0 0 shi 0 trans 0.5\n"
                  "OBJECT world\nkids 3\n"
-                 "OBJECT poly\nname \"WALL\"\nnumvert 3\n0 0 0\n1 0 0\n0 1 0\nnumsurf 1\nSURF 0x0\nmat 0\nrefs 3\n"
+                 "OBJECT poly\nname \"WALL\"\nnumvert 3\n0 0 0\n1 0 0\n0 1 0\nnumsurf 1\nSURF "
+                 "0x0\nmat 0\nrefs 3\n"
                  "0 0 0\n1 0 0\n2 0 0\nkids 0\n"
-                 "OBJECT poly\nname \"PANE\"\nnumvert 3\n0 0 0\n1 0 0\n0 1 0\nnumsurf 1\nSURF 0x0\nmat 1\nrefs 3\n"
+                 "OBJECT poly\nname \"PANE\"\nnumvert 3\n0 0 0\n1 0 0\n0 1 0\nnumsurf 1\nSURF "
+                 "0x0\nmat 1\nrefs 3\n"
                  "0 0 0\n1 0 0\n2 0 0\nkids 0\n"
-                 "OBJECT poly\nname \"TREEP1\"\nnumvert 3\n0 0 0\n1 0 0\n0 1 0\nnumsurf 1\nSURF 0x0\nmat 0\nrefs 3\n"
+                 "OBJECT poly\nname \"TREEP1\"\nnumvert 3\n0 0 0\n1 0 0\n0 1 0\nnumsurf 1\nSURF "
+                 "0x0\nmat 0\nrefs 3\n"
                  "0 0 0\n1 0 0\n2 0 0\nkids 0\n"));
     assert_int_equal(m->object_count, 3);
     assert_int_equal(open_triangles_of(m, 0), 0);
@@ -523,7 +555,8 @@ static void write_archive(const char *path, const small_map *map, int maps)
     assert_non_null(zip);
     for (int i = 2; i >= 0; --i) {
         if (i < maps || i == 2) {
-            assert_int_equal(zipOpenNewFileInZip(zip, names[i], NULL, NULL, 0, NULL, 0, NULL, Z_DEFLATED, 6), 0);
+            assert_int_equal(
+                zipOpenNewFileInZip(zip, names[i], NULL, NULL, 0, NULL, 0, NULL, Z_DEFLATED, 6), 0);
             assert_int_equal(zipWriteInFileInZip(zip, map->bytes, (unsigned)map->size), 0);
             assert_int_equal(zipCloseFileInZip(zip), 0);
         }
@@ -568,8 +601,8 @@ static void bad_files(void **state)
 {
     (void)state;
     umb_error error;
-    static const char *const names[] = {"it.obj",  "it.ply", "it.stl", "it.ac", "it.gltf",
-                                        "it.glb",  "it.bsp", "it.pk3", "it.city.json", "it.xyz"};
+    static const char *const names[] = {"it.obj", "it.ply", "it.stl", "it.ac",        "it.gltf",
+                                        "it.glb", "it.bsp", "it.pk3", "it.city.json", "it.xyz"};
     for (size_t i = 0; i < sizeof names / sizeof names[0]; ++i) {
         assert_null(model_load(write_text(names[i], ""), NULL, &error));
         assert_non_null(strstr(error.text, names[i]));

@@ -1,6 +1,7 @@
-/* Any bytes under the names of the importer's formats: the first byte chooses one. The importer may
- * crash; the reader runs it apart and must live on, with one line of text. PLY is left out: on most damaged
- * files the importer finds no end, and each costs the seconds after which its process is stopped. */
+/* Any bytes under the names of the importer's formats: the first byte chooses one. The importer
+ * may crash; the reader runs it apart and must live on, with one line of text. PLY is left out:
+ * on most damaged files the importer finds no end, and each costs the seconds after which its
+ * process is stopped. */
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -18,7 +19,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         return 0;
     }
     char path[64];
-    (void)snprintf(path, sizeof path, "/tmp/umbrage-fuzz-%ld.%s", (long)getpid(), endings[data[0] % 7]);
+    (void)snprintf(path, sizeof path, "/tmp/umbrage-fuzz-%ld.%s", (long)getpid(),
+                   endings[data[0] % 7]);
     FILE *file = fopen(path, "wb");
     if (file == NULL) {
         return 0;

@@ -80,19 +80,19 @@ static void put_q1_textures(small_map *m)
 /* Corners of the eight faces, clockwise seen from inside the room. 255 ends a face. */
 static const uint8_t q1_rings[8][7] = {
     {3, 9, 2, 1, 8, 0, 255}, /* the floor, with corners 8 and 9 in two of its sides */
-    {4, 7, 3, 0, 255},       {5, 4, 0, 1, 255},       {6, 5, 1, 2, 255}, {7, 6, 2, 3, 255},
-    {5, 6, 7, 4, 255},       /* the sky */
-    {10, 11, 12, 13, 255},   /* the pool */
-    {14, 15, 16, 17, 255},   /* the door */
+    {4, 7, 3, 0, 255},       {5, 4, 0, 1, 255}, {6, 5, 1, 2, 255},
+    {7, 6, 2, 3, 255},       {5, 6, 7, 4, 255}, /* the sky */
+    {10, 11, 12, 13, 255},                      /* the pool */
+    {14, 15, 16, 17, 255},                      /* the door */
 };
 static const uint8_t q1_textures[8] = {0, 0, 0, 0, 0, 1, 2, 3};
 
 static void put_q1_vertices(small_map *m)
 {
     static const float vertices[18][3] = {
-        {0, 0, 0},   {64, 0, 0},  {64, 64, 0}, {0, 64, 0},  {0, 0, 64},  {64, 0, 64},
-        {64, 64, 64}, {0, 64, 64}, {32, 0, 0},  {32, 64, 0}, {8, 8, 8},   {8, 24, 8},
-        {24, 24, 8}, {24, 8, 8},  {0, 30, 0},  {0, 30, 30}, {16, 30, 30}, {16, 30, 0}};
+        {0, 0, 0},    {64, 0, 0},  {64, 64, 0}, {0, 64, 0},  {0, 0, 64},   {64, 0, 64},
+        {64, 64, 64}, {0, 64, 64}, {32, 0, 0},  {32, 64, 0}, {8, 8, 8},    {8, 24, 8},
+        {24, 24, 8},  {24, 8, 8},  {0, 30, 0},  {0, 30, 30}, {16, 30, 30}, {16, 30, 0}};
     size_t start = m->size;
     for (int i = 0; i < 18; ++i) {
         for (int k = 0; k < 3; ++k) {
@@ -224,7 +224,8 @@ static void put_q3_vertices(small_map *m)
     end_lump(m, 8, 11, start);
 }
 
-static void put_q3_face(small_map *m, uint32_t texture, uint32_t type, uint32_t first, uint32_t count)
+static void put_q3_face(small_map *m, uint32_t texture, uint32_t type, uint32_t first,
+                        uint32_t count)
 {
     put32(m, texture);
     put32(m, 0);
@@ -241,14 +242,14 @@ static void put_q3_face(small_map *m, uint32_t texture, uint32_t type, uint32_t 
 static void put_q3_faces(small_map *m)
 {
     size_t start = m->size;
-    put_q3_face(m, 0, 1, 0, 4);   /* 0: a wall */
-    put_q3_face(m, 0, 2, 20, 9);  /* 1: a patch */
-    put_q3_face(m, 0, 3, 29, 3);  /* 2: a mesh of one triangle */
-    put_q3_face(m, 1, 1, 4, 4);   /* 3: fog */
-    put_q3_face(m, 2, 1, 8, 4);   /* 4: sky */
-    put_q3_face(m, 3, 1, 12, 4);  /* 5: not drawn */
-    put_q3_face(m, 0, 4, 0, 0);   /* 6: a billboard */
-    put_q3_face(m, 0, 1, 16, 4);  /* 7: the door */
+    put_q3_face(m, 0, 1, 0, 4);  /* 0: a wall */
+    put_q3_face(m, 0, 2, 20, 9); /* 1: a patch */
+    put_q3_face(m, 0, 3, 29, 3); /* 2: a mesh of one triangle */
+    put_q3_face(m, 1, 1, 4, 4);  /* 3: fog */
+    put_q3_face(m, 2, 1, 8, 4);  /* 4: sky */
+    put_q3_face(m, 3, 1, 12, 4); /* 5: not drawn */
+    put_q3_face(m, 0, 4, 0, 0);  /* 6: a billboard */
+    put_q3_face(m, 0, 1, 16, 4); /* 7: the door */
     end_lump(m, 8, 13, start);
 }
 

@@ -7,25 +7,26 @@
 /* Far beyond any map; a hostile file could otherwise name one surface a million times. */
 #define BSP_TRIANGLE_LIMIT (1u << 24)
 
-bool bsp_read_lump(bsp_scene *s, const uint8_t *data, size_t size, size_t directory, uint32_t number,
-                   const char *what, uint32_t record, bsp_lump *out)
+bool bsp_read_lump(bsp_scene *s, const uint8_t *data, size_t size, size_t directory,
+                   uint32_t number, const char *what, uint32_t record, bsp_lump *out)
 {
     size_t entry = directory + 8 * (size_t)number;
     if (size < 8 || entry > size - 8) {
-        return model_fail(s->error, UMB_ERROR_FORMAT, "%s: ends within its table of lumps; copy the map again",
-                          s->name);
+        return model_fail(s->error, UMB_ERROR_FORMAT,
+                          "%s: ends within its table of lumps; copy the map again", s->name);
     }
     uint32_t offset = le32(data + entry);
     uint32_t length = le32(data + entry + 4);
     if (offset > size || length > size - offset) {
         return model_fail(s->error, UMB_ERROR_FORMAT,
-                          "%s: at byte %zu: lump %u (%s) lies outside the file; copy the map again", s->name,
-                          entry, number, what);
+                          "%s: at byte %zu: lump %u (%s) lies outside the file; copy the map again",
+                          s->name, entry, number, what);
     }
     if (length % record != 0) {
-        return model_fail(s->error, UMB_ERROR_FORMAT,
-                          "%s: at byte %zu: lump %u (%s) is no multiple of %u bytes; use another map", s->name,
-                          entry, number, what, record);
+        return model_fail(
+            s->error, UMB_ERROR_FORMAT,
+            "%s: at byte %zu: lump %u (%s) is no multiple of %u bytes; use another map", s->name,
+            entry, number, what, record);
     }
     out->data = data + offset;
     out->count = length / record;
@@ -61,8 +62,8 @@ static bool make_room(bsp_scene *s, void **array, uint32_t count, uint32_t *room
         return true;
     }
     if (count >= BSP_TRIANGLE_LIMIT) {
-        return model_fail(s->error, UMB_ERROR_LIMIT, "%s: more than %u triangles; use another map", s->name,
-                          BSP_TRIANGLE_LIMIT);
+        return model_fail(s->error, UMB_ERROR_LIMIT, "%s: more than %u triangles; use another map",
+                          s->name, BSP_TRIANGLE_LIMIT);
     }
     uint32_t larger = *room != 0 ? 2 * *room : 4096;
     void *grown = realloc(*array, larger * size);
@@ -76,7 +77,8 @@ static bool make_room(bsp_scene *s, void **array, uint32_t count, uint32_t *room
 
 bool bsp_add_vertex(bsp_scene *s, const float p[3])
 {
-    if (!make_room(s, (void **)&s->positions, s->position_count, &s->position_room, sizeof *s->positions)) {
+    if (!make_room(s, (void **)&s->positions, s->position_count, &s->position_room,
+                   sizeof *s->positions)) {
         return false;
     }
     memcpy(s->positions[s->position_count++], p, 3 * sizeof *p);
@@ -85,7 +87,8 @@ bool bsp_add_vertex(bsp_scene *s, const float p[3])
 
 bool bsp_add_triangle(bsp_scene *s, uint32_t a, uint32_t b, uint32_t c)
 {
-    if (!make_room(s, (void **)&s->triangles, s->triangle_count, &s->triangle_room, sizeof *s->triangles)) {
+    if (!make_room(s, (void **)&s->triangles, s->triangle_count, &s->triangle_room,
+                   sizeof *s->triangles)) {
         return false;
     }
     uint32_t *triangle = s->triangles[s->triangle_count++];
@@ -110,8 +113,8 @@ bool bsp_surfaces_done(bsp_scene *s)
 }
 
 /* Append a surface's triangles and those of its vertices that the object has not met yet. */
-static void append_surface(bsp_scene *s, const bsp_surface *surface, uint32_t mark, uint8_t extra_flags,
-                           model_mesh *mesh)
+static void append_surface(bsp_scene *s, const bsp_surface *surface, uint32_t mark,
+                           uint8_t extra_flags, model_mesh *mesh)
 {
     for (uint32_t t = surface->first; t < surface->first + surface->count; ++t) {
         for (int i = 0; i < 3; ++i) {
@@ -128,7 +131,8 @@ static void append_surface(bsp_scene *s, const bsp_surface *surface, uint32_t ma
     }
 }
 
-bool bsp_add_object(bsp_scene *s, const char *name, const uint32_t *list, uint32_t count, uint8_t extra_flags)
+bool bsp_add_object(bsp_scene *s, const char *name, const uint32_t *list, uint32_t count,
+                    uint8_t extra_flags)
 {
     uint32_t mark = s->into->object_count + 1;
     size_t triangles = 0;
@@ -140,8 +144,9 @@ bool bsp_add_object(bsp_scene *s, const char *name, const uint32_t *list, uint32
     }
     s->placed += triangles + count;
     if (s->placed > BSP_TRIANGLE_LIMIT) {
-        return model_fail(s->error, UMB_ERROR_LIMIT, "%s: its leaves name more than %u triangles; use another map",
-                          s->name, BSP_TRIANGLE_LIMIT);
+        return model_fail(s->error, UMB_ERROR_LIMIT,
+                          "%s: its leaves name more than %u triangles; use another map", s->name,
+                          BSP_TRIANGLE_LIMIT);
     }
     if (triangles == 0) {
         return model_add_object(s->into, name, MODEL_NONE, NULL) != MODEL_NONE ||

@@ -1,5 +1,5 @@
-/* What Quake and Quake 3 maps have in common: surfaces of triangles, gathered into one object a leaf
- * cluster and one a sub-model. */
+/* What Quake and Quake 3 maps have in common: surfaces of triangles, gathered into one object a
+ * leaf cluster and one a sub-model. */
 #ifndef BSP_SCENE_H
 #define BSP_SCENE_H
 
@@ -59,8 +59,8 @@ static inline bool bsp_range(uint32_t first, uint32_t count, uint32_t limit)
 }
 
 /* Lump number of a file: its offset and size stand at directory + 8 * number. */
-bool bsp_read_lump(bsp_scene *s, const uint8_t *data, size_t size, size_t directory, uint32_t number,
-                   const char *what, uint32_t record, bsp_lump *out);
+bool bsp_read_lump(bsp_scene *s, const uint8_t *data, size_t size, size_t directory,
+                   uint32_t number, const char *what, uint32_t record, bsp_lump *out);
 
 /* Start with a model and room for surfaces; false: no memory, with text. */
 bool bsp_scene_start(bsp_scene *s, uint32_t surfaces);
@@ -74,8 +74,9 @@ bool bsp_add_triangle(bsp_scene *s, uint32_t a, uint32_t b, uint32_t c);
 /* After the last surface: marks for the objects to come. */
 bool bsp_surfaces_done(bsp_scene *s);
 
-/* An object of the listed surfaces (all below surface_count), each taken once. extra_flags are set on all
- * of its triangles. */
-bool bsp_add_object(bsp_scene *s, const char *name, const uint32_t *list, uint32_t count, uint8_t extra_flags);
+/* An object of the listed surfaces (all below surface_count), each taken once. extra_flags are
+ * set on all of its triangles. */
+bool bsp_add_object(bsp_scene *s, const char *name, const uint32_t *list, uint32_t count,
+                    uint8_t extra_flags);
 
 #endif

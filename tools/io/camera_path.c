@@ -31,7 +31,8 @@ static int read_numbers(const char *line, const char *end, double number[6], boo
         }
         char *after = NULL;
         double value = p < stop ? strtod(p, &after) : 0.0;
-        bool is_number = p < stop && after != p && after <= stop && strchr("+-.0123456789", *p) != NULL;
+        bool is_number = p < stop && after != p && after <= stop &&
+                         strchr("+-.0123456789", *p) != NULL;
         *any = *any || is_number;
         for (; is_number && after < stop && isspace((unsigned char)*after); ++after) {
         }
@@ -71,7 +72,8 @@ static bool add_row(camera_path *out, uint32_t *room, const double row[6])
     return true;
 }
 
-static bool read_lines(const char *text, const char *end, const char *name, camera_path *out, umb_error *error)
+static bool read_lines(const char *text, const char *end, const char *name, camera_path *out,
+                       umb_error *error)
 {
     uint32_t room = 0;
     unsigned line_number = 0;
@@ -87,16 +89,18 @@ static bool read_lines(const char *text, const char *end, const char *name, came
                 return model_fail_memory(error, name);
             }
         } else if (!blank(line, stop) && (any || out->count != 0)) {
-            return model_fail(error, UMB_ERROR_FORMAT, "%s:%u: not six numbers; write ex,ey,ez,tx,ty,tz", name,
-                              line_number);
+            return model_fail(error, UMB_ERROR_FORMAT,
+                              "%s:%u: not six numbers; write ex,ey,ez,tx,ty,tz", name, line_number);
         }
         line = newline != NULL ? newline + 1 : end;
     }
-    return out->count != 0 || model_fail(error, UMB_ERROR_FORMAT,
-                                         "%s: no view in it; write ex,ey,ez,tx,ty,tz, one view a line", name);
+    return out->count != 0 ||
+           model_fail(error, UMB_ERROR_FORMAT,
+                      "%s: no view in it; write ex,ey,ez,tx,ty,tz, one view a line", name);
 }
 
-bool read_camera_path(const char *text, size_t size, const char *name, camera_path *out, umb_error *error)
+bool read_camera_path(const char *text, size_t size, const char *name, camera_path *out,
+                      umb_error *error)
 {
     memset(out, 0, sizeof *out);
     /* A byte order mark is no part of the first line. */

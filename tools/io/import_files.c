@@ -66,7 +66,9 @@ static aiReturn file_seek(struct aiFile *file, size_t offset, enum aiOrigin orig
 {
     open_file *f = opened(file);
     if (f->disk != NULL) {
-        int whence = origin == aiOrigin_CUR ? SEEK_CUR : origin == aiOrigin_END ? SEEK_END : SEEK_SET;
+        int whence = origin == aiOrigin_CUR   ? SEEK_CUR
+                     : origin == aiOrigin_END ? SEEK_END
+                                              : SEEK_SET;
         return fseek(f->disk, (long)offset, whence) == 0 ? aiReturn_SUCCESS : aiReturn_FAILURE;
     }
     /* Offsets are signed numbers in disguise; the sum wraps as it should. */

@@ -27,7 +27,7 @@ static bool read_all(FILE *file, const char *path, input *out, umb_error *error)
         return model_fail(error, UMB_ERROR_FORMAT, "%s: not a file; name a scene file", path);
     }
     if (status.st_size <= 0) {
-        return model_fail(error, UMB_ERROR_FORMAT, "%s: the file is empty; name a scene file", path);
+        return model_fail(error, UMB_ERROR_FORMAT, "%s: empty; name a scene file", path);
     }
     if ((uint64_t)status.st_size > INPUT_LIMIT) {
         return model_fail(error, UMB_ERROR_LIMIT, "%s: larger than 4 GiB; cut the scene", path);
@@ -39,8 +39,8 @@ static bool read_all(FILE *file, const char *path, input *out, umb_error *error)
     }
     if (fread(out->data, 1, out->size, file) != out->size) {
         input_free(out);
-        return model_fail(error, UMB_ERROR_FORMAT, "%s: cannot be read to its end; is it being written?",
-                          path);
+        return model_fail(error, UMB_ERROR_FORMAT,
+                          "%s: cannot be read to its end; is it being written?", path);
     }
     return true;
 }
@@ -68,14 +68,16 @@ const char *input_packed_name(const char *name)
 {
     for (const char *c = name; (c = strchr(c, ':')) != NULL; ++c) {
         size_t before = (size_t)(c - name);
-        if (before >= 4 && (strncasecmp(c - 4, ".pk3", 4) == 0 || strncasecmp(c - 4, ".zip", 4) == 0)) {
+        if (before >= 4 &&
+            (strncasecmp(c - 4, ".pk3", 4) == 0 || strncasecmp(c - 4, ".zip", 4) == 0)) {
             return c;
         }
     }
     return NULL;
 }
 
-/* Look for the maps of an archive. Leaves the archive at the last one; names goes into error texts. */
+/* Look for the maps of an archive. Leaves the archive at the last one; names goes into error
+ * texts. */
 static int find_maps(unzFile zip, char *names, size_t size, unz_file_pos *place)
 {
     int maps = 0;
@@ -105,7 +107,8 @@ static bool read_member(unzFile zip, const char *archive, input *out, umb_error 
     unz_file_info info;
     if (unzGetCurrentFileInfo(zip, &info, NULL, 0, NULL, 0, NULL, 0) != UNZ_OK ||
         unzOpenCurrentFile(zip) != UNZ_OK) {
-        return model_fail(error, UMB_ERROR_FORMAT, "%s: the archive is damaged; copy it again", archive);
+        return model_fail(error, UMB_ERROR_FORMAT, "%s: the archive is damaged; copy it again",
+                          archive);
     }
     /* Deflate packs at most 1032 to 1: a size that no such stream can give is a lie. */
     bool honest = info.uncompressed_size != 0 &&
@@ -117,7 +120,8 @@ static bool read_member(unzFile zip, const char *archive, input *out, umb_error 
         read = out->data != NULL;
         for (size_t done = 0; read && done < out->size;) {
             size_t left = out->size - done;
-            int got = unzReadCurrentFile(zip, out->data + done, left < 1 << 20 ? (unsigned)left : 1 << 20);
+            int got = unzReadCurrentFile(zip, out->data + done,
+                                         left < 1 << 20 ? (unsigned)left : 1 << 20);
             read = got > 0;
             done += read ? (size_t)got : 0;
         }
@@ -125,8 +129,8 @@ static bool read_member(unzFile zip, const char *archive, input *out, umb_error 
     read = unzCloseCurrentFile(zip) == UNZ_OK && read; /* checks the member's CRC */
     if (!read) {
         input_free(out);
-        return model_fail(error, UMB_ERROR_FORMAT, "%s: a file in the archive is empty or damaged; copy it again",
-                          archive);
+        return model_fail(error, UMB_ERROR_FORMAT,
+                          "%s: a file in the archive is empty or damaged; copy it again", archive);
     }
     return true;
 }
@@ -136,8 +140,8 @@ bool input_read_packed(const char *archive, const char *member, input *out, umb_
     memset(out, 0, sizeof *out);
     unzFile zip = unzOpen(archive);
     if (zip == NULL) {
-        return model_fail(error, UMB_ERROR_FORMAT, "%s: no such file or not a .pk3 archive; check the name",
-                          archive);
+        return model_fail(error, UMB_ERROR_FORMAT,
+                          "%s: no such file or not a .pk3 archive; check the name", archive);
     }
     char names[160];
     unz_file_pos place;
@@ -152,8 +156,9 @@ bool input_read_packed(const char *archive, const char *member, input *out, umb_
     } else {
         found = maps == 1 && unzGoToFilePos(zip, &place) == UNZ_OK;
         if (!found) {
-            model_fail(error, UMB_ERROR_FORMAT, "%s: holds %d maps; name one as %s:maps/NAME.bsp: %s", archive,
-                       maps, archive, names);
+            model_fail(error, UMB_ERROR_FORMAT,
+                       "%s: holds %d maps; name one as %s:maps/NAME.bsp: %s", archive, maps,
+                       archive, names);
         }
     }
     found = found && read_member(zip, archive, out, error);

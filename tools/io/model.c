@@ -59,7 +59,8 @@ void model_free(model *m)
     free(m);
 }
 
-/* Room for one more element. Arrays hold 16, then powers of two, so the count tells the capacity. */
+/* Room for one more element. Arrays hold 16, then powers of two, so the count tells the
+ * capacity. */
 static bool make_room(void **array, uint32_t count, size_t size)
 {
     if (count >= MODEL_LIMIT) {
@@ -176,8 +177,8 @@ static bool object_bounds(const model *m, const model_object *o, umb_aabb *out)
     return true;
 }
 
-/* Boxes of all objects and of the scene. An object whose transform throws a vertex out of the floats
- * cannot be placed: it keeps its number and loses its mesh. */
+/* Boxes of all objects and of the scene. An object whose transform throws a vertex out of the
+ * floats cannot be placed: it keeps its number and loses its mesh. */
 static void compute_bounds(model *m)
 {
     bool any = false;

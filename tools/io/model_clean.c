@@ -40,7 +40,8 @@ static void drop_vertices(model_mesh *mesh, const uint8_t *marks, uint32_t *renu
     uint32_t kept = 0;
     for (uint32_t v = 0; v < mesh->position_count; ++v) {
         if ((marks[v] & VERTEX_USED) != 0) {
-            memmove(mesh->positions + 3 * (size_t)kept, mesh->positions + 3 * (size_t)v, 3 * sizeof(float));
+            memmove(mesh->positions + 3 * (size_t)kept, mesh->positions + 3 * (size_t)v,
+                    3 * sizeof(float));
             renumbered[v] = kept++;
         }
     }

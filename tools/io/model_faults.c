@@ -1,6 +1,6 @@
-/* What is wrong with the input, counted. Vertices are one when their positions are equal, whatever
- * their indices: files split vertices for normals and texture coordinates, and such a seam is no border.
- * Each mesh is counted once, however many instances it has. */
+/* What is wrong with the input, counted. Vertices are one when their positions are equal,
+ * whatever their indices: files split vertices for normals and texture coordinates, and such a
+ * seam is no border. Each mesh is counted once, however many instances it has. */
 #include "model_parts.h"
 
 #include <math.h>
@@ -240,7 +240,8 @@ static bool count_outliers(model *m)
 {
     size_t vertices = 0;
     for (uint32_t i = 0; i < m->object_count; ++i) {
-        vertices += m->objects[i].mesh != MODEL_NONE ? m->meshes[m->objects[i].mesh].position_count : 0;
+        vertices += m->objects[i].mesh != MODEL_NONE ? m->meshes[m->objects[i].mesh].position_count
+                                                     : 0;
     }
     size_t stride = vertices / OUTLIER_SAMPLE + 1;
     float *values = malloc((vertices / stride + 2) * sizeof *values);
@@ -263,7 +264,8 @@ static bool count_outliers(model *m)
         bool outside = false;
         for (int k = 0; k < 3; ++k) {
             double size = (double)high[k] - low[k];
-            outside = outside || o->bounds.max[k] > high[k] + size || o->bounds.min[k] < low[k] - size;
+            outside = outside || o->bounds.max[k] > high[k] + size ||
+                      o->bounds.min[k] < low[k] - size;
         }
         m->faults.outlier_objects += outside && o->mesh != MODEL_NONE;
     }

@@ -7,7 +7,8 @@
 #include "readers.h"
 
 /* Quake maps tell their kind by their first four bytes. */
-static model *read_bsp(const input *in, const char *name, const model_options *options, umb_error *error)
+static model *read_bsp(const input *in, const char *name, const model_options *options,
+                       umb_error *error)
 {
     static const uint8_t quake3[4] = {'I', 'B', 'S', 'P'};
     static const uint8_t quake1[4] = {29, 0, 0, 0};
@@ -18,7 +19,8 @@ static model *read_bsp(const input *in, const char *name, const model_options *o
         return read_q1bsp(in->data, in->size, name, options, error);
     }
     model_fail(error, UMB_ERROR_FORMAT,
-               "%s: at byte 0: neither IBSP (Quake 3) nor version 29 (Quake); use another map", name);
+               "%s: at byte 0: neither IBSP (Quake 3) nor version 29 (Quake); use another map",
+               name);
     return NULL;
 }
 
@@ -28,8 +30,9 @@ static model *load_bytes(const char *scene, const model_options *options, umb_er
     if (!input_read(scene, &in, error)) {
         return NULL;
     }
-    model *m = input_ends_with(scene, ".bsp") ? read_bsp(&in, scene, options, error)
-                                              : read_cityjson(in.data, in.size, scene, options, error);
+    model *m = input_ends_with(scene, ".bsp")
+                   ? read_bsp(&in, scene, options, error)
+                   : read_cityjson(in.data, in.size, scene, options, error);
     input_free(&in);
     return m;
 }

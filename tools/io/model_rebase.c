@@ -1,10 +1,9 @@
 /* Moving far scenes to the origin without moving a vertex.
  *
- * Sterbenz: for floats x and o with o/2 <= x <= 2o the difference x - o is a float. The origin is chosen
- * so that every coordinate of the box lies in that range of it; transforms are changed only where the
- * new translation is a float too, so that the world vertices are the same real numbers as before, minus
- * the origin, rounded more finely.
- */
+ * Sterbenz: for floats x and o with o/2 <= x <= 2o the difference x - o is a float. The origin
+ * is chosen so that every coordinate of the box lies in that range of it; transforms are changed
+ * only where the new translation is a float too, so that the world vertices are the same real
+ * numbers as before, minus the origin, rounded more finely. */
 #include "model_parts.h"
 
 #include <math.h>
@@ -76,7 +75,7 @@ static void look_at_instances(const model *m, uint8_t *common)
         }
         uint8_t *bits = &common[m->objects[i].mesh];
         if (!linear_part_is_identity(t)) {
-            *bits &= (uint8_t)~(ALL_LINEAR_IDENTITY | ALL_IDENTITY);
+            *bits &= (uint8_t) ~(ALL_LINEAR_IDENTITY | ALL_IDENTITY);
         }
         for (int k = 0; k < 3; ++k) {
             if (t->m[k][3] != 0.0f) {

@@ -1,9 +1,9 @@
 /* Cutting large meshes into spatial clusters, so that a landscape or a hall is not one object.
  *
- * Triangles are halved along the longest axis of the box around their centres until no more than the
- * limit is left; the halves hold whole clusters' worth, so the count is the least possible. Instances of
- * a mesh share its clusters. Nothing depends on anything but the mesh and the limit.
- */
+ * Triangles are halved along the longest axis of the box around their centres until no more than
+ * the limit is left; the halves hold whole clusters' worth, so the count is the least possible.
+ * Instances of a mesh share its clusters. Nothing depends on anything but the mesh and the
+ * limit. */
 #include "model_parts.h"
 
 #include <math.h>
@@ -60,7 +60,8 @@ static int longest_axis(const centre *c, size_t n)
 
 /* Order c so that clusters of at most limit triangles follow one another; starts gets the first
  * triangle of each. The depth is the logarithm of the number of clusters. */
-static void cut(centre *c, size_t first, size_t n, uint32_t limit, size_t *starts, size_t *start_count)
+static void cut(centre *c, size_t first, size_t n, uint32_t limit, size_t *starts,
+                size_t *start_count)
 {
     size_t clusters = (n + limit - 1) / limit;
     if (clusters <= 1) {
@@ -79,7 +80,8 @@ static void cut(centre *c, size_t first, size_t n, uint32_t limit, size_t *start
 }
 
 /* A mesh of the listed triangles, with the vertices that they use, in order of first use. */
-static uint32_t add_cluster(model *m, const model_mesh *from, const centre *list, size_t n, uint32_t *renumbered)
+static uint32_t add_cluster(model *m, const model_mesh *from, const centre *list, size_t n,
+                            uint32_t *renumbered)
 {
     model_mesh part = {
         .positions = malloc((9 * n + 1) * sizeof(float)),
@@ -92,8 +94,8 @@ static uint32_t add_cluster(model *m, const model_mesh *from, const centre *list
         for (size_t i = 0; i < 3 * n; ++i) {
             uint32_t v = from->indices[3 * (size_t)list[i / 3].triangle + i % 3];
             if (renumbered[v] == MODEL_NONE) {
-                memcpy(part.positions + 3 * (size_t)part.position_count, from->positions + 3 * (size_t)v,
-                       3 * sizeof(float));
+                memcpy(part.positions + 3 * (size_t)part.position_count,
+                       from->positions + 3 * (size_t)v, 3 * sizeof(float));
                 renumbered[v] = part.position_count++;
             }
             part.indices[i] = renumbered[v];
@@ -134,7 +136,8 @@ static uint32_t split_mesh(model *to, const model_mesh *mesh, uint32_t limit, ui
         cut(centres, 0, n, limit, starts, &clusters);
         starts[clusters] = n;
         for (size_t i = 0; i < clusters; ++i) {
-            uint32_t added = add_cluster(to, mesh, centres + starts[i], starts[i + 1] - starts[i], renumbered);
+            uint32_t added = add_cluster(to, mesh, centres + starts[i], starts[i + 1] - starts[i],
+                                         renumbered);
             if (added == MODEL_NONE) {
                 first = MODEL_NONE;
                 break;

@@ -2,8 +2,8 @@
  *
  * They do when all three projections have zero area. A projection's doubled area is
  *   ax*by - ax*cy - ay*bx + ay*cx + bx*cy - by*cx,
- * six products of 24-bit floats, each exact in double. Doubles first: with every product rounded not at
- * all, five additions of at most six terms err by less than 6 u S, u = 2^-53, S the sum of absolute
+ * six products of 24-bit floats, each exact in double. Doubles first: the products are exact, so
+ * five additions of at most six terms err by less than 6 u S, u = 2^-53, S the sum of absolute
  * values. When that does not decide, the six are summed into an expansion without error (Shewchuk,
  * Adaptive Precision Floating-Point Arithmetic, 1997, grow-expansion).
  */

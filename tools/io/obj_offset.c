@@ -14,8 +14,9 @@ static const char *line_end(const char *p, const char *end)
     return newline != NULL ? newline : end;
 }
 
-/* Read "v x y z"; *rest is what follows. 1: a vertex, 0: another line, -1: a vertex written in a way
- * that this reader leaves to the importer (homogeneous, continued on the next line, not finite). */
+/* Read "v x y z"; *rest is what follows. 1: a vertex, 0: another line, -1: a vertex written in a
+ * way that this reader leaves to the importer (homogeneous, continued on the next line, not
+ * finite). */
 static int read_vertex(const char *line, const char *end, double at[3], const char **rest)
 {
     while (line < end && (*line == ' ' || *line == '\t')) {
@@ -76,7 +77,8 @@ static size_t measure(const char *text, const char *end, double min[3], double m
     return count;
 }
 
-/* A vertex line as it will be written: sign, nine digits, point, exponent and blank, three times. */
+/* A vertex line as it will be written: sign, nine digits, point, exponent and blank, three
+ * times. */
 #define VERTEX_ROOM 56
 
 static size_t rewrite(const char *text, const char *end, const double origin[3], char *out)

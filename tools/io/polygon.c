@@ -99,8 +99,8 @@ static bool list_blocks(const outline *o, uint32_t start, const point *a, const 
     return false;
 }
 
-/* The list point nearest to m that m sees, walking the list once for each try in order of distance would
- * cost a sort; a candidate is tested only when it is nearer than the best so far. */
+/* The list point nearest to m that m sees, walking the list once for each try in order of
+ * distance would cost a sort; a candidate is tested only when it is nearer than the best so far. */
 static uint32_t find_bridge(const outline *o, uint32_t m)
 {
     const point *from = &o->points[m];
@@ -109,9 +109,11 @@ static uint32_t find_bridge(const outline *o, uint32_t m)
     uint32_t i = o->start;
     do {
         const point *to = &o->points[i];
-        double distance = (to->x - from->x) * (to->x - from->x) + (to->y - from->y) * (to->y - from->y);
-        if (distance < best_distance && in_cone(o->points, to, from) && in_cone(o->points, from, to) &&
-            !list_blocks(o, o->start, from, to) && !list_blocks(o, m, from, to)) {
+        double distance = (to->x - from->x) * (to->x - from->x) +
+                          (to->y - from->y) * (to->y - from->y);
+        if (distance < best_distance && in_cone(o->points, to, from) &&
+            in_cone(o->points, from, to) && !list_blocks(o, o->start, from, to) &&
+            !list_blocks(o, m, from, to)) {
             best = i;
             best_distance = distance;
         }
@@ -152,9 +154,9 @@ static int compare_holes(const void *a, const void *b)
     return p->at < q->at ? -1 : p->at > q->at;
 }
 
-/* Join all holes to the outer ring, the one that reaches farthest to the right first: nothing but the
- * list itself stands to the right of that corner, so the list has a point that it sees. Holes without
- * such a point lie outside; false then. */
+/* Join all holes to the outer ring, the one that reaches farthest to the right first: nothing
+ * but the list itself stands to the right of that corner, so the list has a point that it sees.
+ * Holes without such a point lie outside; false then. */
 static bool join_holes(outline *o, const polygon *p, hole *holes)
 {
     uint32_t count = 0;
@@ -199,22 +201,23 @@ static bool is_ear(const outline *o, uint32_t i)
     }
     for (uint32_t k = c->next; k != b->previous; k = o->points[k].next) {
         const point *q = &o->points[k];
-        if (turn(a, b, q) >= 0.0 && turn(b, c, q) >= 0.0 && turn(c, a, q) >= 0.0 && !same_place(q, a) &&
-            !same_place(q, b) && !same_place(q, c)) {
+        if (turn(a, b, q) >= 0.0 && turn(b, c, q) >= 0.0 && turn(c, a, q) >= 0.0 &&
+            !same_place(q, a) && !same_place(q, b) && !same_place(q, c)) {
             return false;
         }
     }
     return true;
 }
 
-/* A point whose neighbours lie in one line with it: cut off last, as part of a triangle of area; or,
- * where the line turns back on itself, a spike of no area that may go at once. */
+/* A point whose neighbours lie in one line with it: cut off last, as part of a triangle of area;
+ * or, where the line turns back on itself, a spike of no area that may go at once. */
 static bool is_spike(const outline *o, uint32_t i)
 {
     const point *b = &o->points[i];
     const point *a = &o->points[b->previous];
     const point *c = &o->points[b->next];
-    return turn(a, b, c) == 0.0 && (a->x - b->x) * (c->x - b->x) + (a->y - b->y) * (c->y - b->y) >= 0.0;
+    return turn(a, b, c) == 0.0 &&
+           (a->x - b->x) * (c->x - b->x) + (a->y - b->y) * (c->y - b->y) >= 0.0;
 }
 
 static uint32_t cut_off(outline *o, uint32_t i, uint32_t out[3], bool *sound)
@@ -232,8 +235,8 @@ static uint32_t cut_off(outline *o, uint32_t i, uint32_t out[3], bool *sound)
     return after;
 }
 
-/* Cut ears until a triangle is left. Where a whole round finds none, the rings are at fault: the next
- * corner goes, ear or not, and the turn of its triangle tells whether that did harm. */
+/* Cut ears until a triangle is left. Where a whole round finds none, the rings are at fault: the
+ * next corner goes, ear or not, and the turn of its triangle tells whether that did harm. */
 static uint32_t cut_ears(outline *o, uint32_t (*out)[3], bool *sound)
 {
     uint32_t count = 0;
@@ -254,8 +257,8 @@ static uint32_t cut_ears(outline *o, uint32_t (*out)[3], bool *sound)
     return count;
 }
 
-/* The corners in the plane of the two axes where the surface is largest, turned so that the outer ring
- * runs counter-clockwise. */
+/* The corners in the plane of the two axes where the surface is largest, turned so that the
+ * outer ring runs counter-clockwise. */
 static void flatten(const polygon *p, point *points)
 {
     double normal[3];
@@ -285,7 +288,8 @@ uint32_t polygon_triangulate(const polygon *p, uint32_t (*out)[3], bool *sound)
     if (p->rings == 0 || p->starts[1] - p->starts[0] < 3) {
         return 0;
     }
-    outline o = {.count = p->starts[p->rings], .start = p->starts[0], .left = p->starts[1] - p->starts[0]};
+    outline o = {
+        .count = p->starts[p->rings], .start = p->starts[0], .left = p->starts[1] - p->starts[0]};
     o.points = malloc(((size_t)o.count + 2 * (size_t)p->rings) * sizeof *o.points);
     hole *holes = malloc(p->rings * sizeof *holes);
     uint32_t count = UINT32_MAX;

@@ -13,13 +13,14 @@ typedef struct polygon {
     uint32_t rings;
 } polygon;
 
-/* Writes three corner numbers a triangle to out, which has room for corners + 2 * rings triangles.
- * Returns how many: corners + 2 * holes - 2, fewer where the polygon is none; UINT32_MAX without memory.
+/* Writes three corner numbers a triangle to out, which has room for corners + 2 * rings
+ * triangles. Returns how many: corners + 2 * holes - 2, fewer where the polygon is none;
+ * UINT32_MAX without memory.
  *
- * *sound is set when every triangle turns as the polygon does or has no area. Cutting off an ear takes
- * its boundary from the polygon's, so the triangles' boundaries always add up to the polygon's: when
- * none of them turns the wrong way they cover its inside and nothing else. Rings that cross themselves
- * or one another end unsound; what such triangles cover is anyone's guess. */
+ * *sound is set when every triangle turns as the polygon does or has no area. Cutting off an ear
+ * takes its boundary from the polygon's, so the triangles' boundaries always add up to the
+ * polygon's: when none of them turns the wrong way they cover its inside and nothing else. Rings
+ * that cross themselves or one another end unsound; what such triangles cover is anyone's guess. */
 uint32_t polygon_triangulate(const polygon *p, uint32_t (*out)[3], bool *sound);
 
 #endif

@@ -12,8 +12,8 @@
 
 #include "model_parts.h"
 
-/* What goes through the pipe: a header, then each mesh, then each object. Both ends are one program, so
- * structs go as they are. */
+/* What goes through the pipe: a header, then each mesh, then each object. Both ends are one
+ * program, so structs go as they are. */
 typedef struct header {
     uint32_t read; /* 0: error only */
     uint32_t mesh_count, object_count;
@@ -65,7 +65,8 @@ static bool write_model(FILE *to, const model *m, const umb_error *error)
     for (uint32_t i = 0; m != NULL && i < m->object_count && written; ++i) {
         const model_object *o = &m->objects[i];
         object_header object = {o->transform, o->mesh, (uint32_t)strlen(o->name)};
-        written = write_some(to, &object, sizeof object) && write_some(to, o->name, object.name_size);
+        written = write_some(to, &object, sizeof object) &&
+                  write_some(to, o->name, object.name_size);
     }
     return written && fflush(to) == 0;
 }
@@ -84,8 +85,8 @@ static rlim_t address_space(void)
     return (rlim_t)pages * (rlim_t)sysconf(_SC_PAGESIZE);
 }
 
-/* Damaged files can also make the importer run for ever or ask for all memory. What it gets is far more
- * than honest files of that size take. */
+/* Damaged files can also make the importer run for ever or ask for all memory. What it gets is
+ * far more than honest files of that size take. */
 static void limit_child(const char *path)
 {
     struct stat status;
@@ -208,7 +209,8 @@ model *read_apart(read_function *read, const char *path, umb_error *error)
     }
     umb_error told;
     model_fail(&told, UMB_ERROR_FORMAT,
-               "%s: the importer crashed or found no end; the file is damaged, export it again", path);
+               "%s: the importer crashed or found no end; the file is damaged, export it again",
+               path);
     model *m = from != NULL ? read_model(from, &told) : NULL;
     if (m == NULL && error != NULL) {
         *error = told;

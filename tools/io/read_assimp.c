@@ -1,8 +1,8 @@
 /* Whatever the importer reads: glTF, OBJ, PLY, STL, AC3D, IFC and more.
  *
- * The importer runs under triangulation alone, so that meshes and nodes are the file's. Objects are its
- * mesh instances in depth-first node order; a mesh that several nodes use stays one mesh.
- */
+ * The importer runs under triangulation alone, so that meshes and nodes are the file's. Objects
+ * are its mesh instances in depth-first node order; a mesh that several nodes use stays one
+ * mesh. */
 #include <assimp/cimport.h>
 #include <assimp/material.h>
 #include <assimp/postprocess.h>
@@ -52,19 +52,20 @@ static float material_number(const struct aiMaterial *material, const char *key,
 {
     float value = otherwise;
     unsigned count = 1;
-    if (aiGetMaterialFloatArray(material, key, 0, 0, &value, &count) != aiReturn_SUCCESS || count != 1) {
+    if (aiGetMaterialFloatArray(material, key, 0, 0, &value, &count) != aiReturn_SUCCESS ||
+        count != 1) {
         return otherwise;
     }
     return value;
 }
 
-/* Whether the picture on a surface is cut out: it has pixels that are not opaque or, for trees of AC3D
- * scenes, a name that tells. */
+/* Whether the picture on a surface is cut out: it has pixels that are not opaque or, for trees
+ * of AC3D scenes, a name that tells. */
 static bool has_cut_out_texture(assimp_reader *r, const struct aiMaterial *material)
 {
     struct aiString texture;
-    if (aiGetMaterialTexture(material, aiTextureType_DIFFUSE, 0, &texture, NULL, NULL, NULL, NULL, NULL,
-                             NULL) != aiReturn_SUCCESS) {
+    if (aiGetMaterialTexture(material, aiTextureType_DIFFUSE, 0, &texture, NULL, NULL, NULL, NULL,
+                             NULL, NULL) != aiReturn_SUCCESS) {
         return false;
     }
     const char *slash = strrchr(texture.data, '/');
@@ -72,14 +73,15 @@ static bool has_cut_out_texture(assimp_reader *r, const struct aiMaterial *mater
            texture_has_alpha(&r->alphas, r->path, texture.data);
 }
 
-/* What the material says about hiding. glTF says it plainly; elsewhere an opacity below one, a map of
- * opacity, or a picture with holes means that one may see through. Nothing said means opaque and
- * one-sided. */
+/* What the material says about hiding. glTF says it plainly; elsewhere an opacity below one, a
+ * map of opacity, or a picture with holes means that one may see through. Nothing said means
+ * opaque and one-sided. */
 static uint8_t material_flags(assimp_reader *r, const struct aiMaterial *material)
 {
     uint8_t flags = 0;
     struct aiString mode;
-    bool gltf = aiGetMaterialString(material, "$mat.gltf.alphaMode", 0, 0, &mode) == aiReturn_SUCCESS;
+    bool gltf = aiGetMaterialString(material, "$mat.gltf.alphaMode", 0, 0, &mode) ==
+                aiReturn_SUCCESS;
     if (gltf && strcmp(mode.data, "OPAQUE") != 0) {
         flags |= UMB_TRIANGLE_OPEN;
     }
@@ -93,7 +95,8 @@ static uint8_t material_flags(assimp_reader *r, const struct aiMaterial *materia
     }
     int two_sided = 0;
     unsigned count = 1;
-    if (aiGetMaterialIntegerArray(material, "$mat.twosided", 0, 0, &two_sided, &count) == aiReturn_SUCCESS &&
+    if (aiGetMaterialIntegerArray(material, "$mat.twosided", 0, 0, &two_sided, &count) ==
+            aiReturn_SUCCESS &&
         two_sided != 0) {
         flags |= UMB_TRIANGLE_TWO_SIDED;
     }
@@ -104,8 +107,9 @@ static uint8_t material_flags(assimp_reader *r, const struct aiMaterial *materia
 static bool read_mesh(assimp_reader *r, unsigned number, bool open)
 {
     const struct aiMesh *from = r->scene->mMeshes[number];
-    const struct aiMaterial *material =
-        from->mMaterialIndex < r->scene->mNumMaterials ? r->scene->mMaterials[from->mMaterialIndex] : NULL;
+    const struct aiMaterial *material = from->mMaterialIndex < r->scene->mNumMaterials
+                                            ? r->scene->mMaterials[from->mMaterialIndex]
+                                            : NULL;
     uint8_t flags = material != NULL ? material_flags(r, material) : 0;
     flags |= open ? UMB_TRIANGLE_OPEN : 0;
     size_t faces = from->mVertices != NULL ? from->mNumFaces : 0;
@@ -119,7 +123,8 @@ static bool read_mesh(assimp_reader *r, unsigned number, bool open)
     for (size_t f = 0; f < faces && added; ++f) {
         const struct aiFace *face = &from->mFaces[f];
         if (face->mNumIndices == 3) {
-            memcpy(mesh.indices + 3 * (size_t)mesh.triangle_count, face->mIndices, 3 * sizeof(uint32_t));
+            memcpy(mesh.indices + 3 * (size_t)mesh.triangle_count, face->mIndices,
+                   3 * sizeof(uint32_t));
             mesh.flags[mesh.triangle_count++] = flags;
         }
     }
@@ -150,7 +155,8 @@ static bool read_node(assimp_reader *r, const struct aiNode *node, const placeme
         if (r->mesh_of[number] == UNREAD && !read_mesh(r, number, tree)) {
             return false;
         }
-        const char *name = node->mName.length != 0 ? node->mName.data : r->scene->mMeshes[number]->mName.data;
+        const char *name = node->mName.length != 0 ? node->mName.data
+                                                   : r->scene->mMeshes[number]->mName.data;
         if (model_add_object(r->into, name, r->mesh_of[number], &transform) == MODEL_NONE) {
             return false;
         }
@@ -197,12 +203,12 @@ static model *import(const char *path, umb_error *error)
         const char *said = aiGetErrorString();
         size_t length = strcspn(said, "\n");
         length -= length != 0 && said[length - 1] == '.';
-        model_fail(error, UMB_ERROR_FORMAT, "%s: the importer says: %.*s; convert the scene to glTF", path,
-                   length < 120 ? (int)length : 120, said);
+        model_fail(error, UMB_ERROR_FORMAT, "%s: the importer says: %.*s; convert the scene to glTF",
+                   path, length < 120 ? (int)length : 120, said);
     } else if (r.into == NULL || !read_scene(&r)) {
         model_fail_memory(error, path);
     } else if (r.into->object_count == 0) {
-        model_fail(error, UMB_ERROR_FORMAT, "%s: no meshes in it; name a scene with surfaces", path);
+        model_fail(error, UMB_ERROR_FORMAT, "%s: no meshes; name a scene with surfaces", path);
     } else {
         memcpy(r.into->origin, origin, sizeof origin);
         read = true;

@@ -1,9 +1,8 @@
 /* CityJSON: cities as surfaces with holes, on a shared table of integer vertices.
  *
- * Objects are the city objects that have surfaces, in the file's order: in most files one a building
- * part. Of several levels of detail the highest is taken. Vertices become floats once, after the scale,
- * the translation and our own offset have been applied in double.
- */
+ * Objects are the city objects that have surfaces, in the file's order: in most files one a
+ * building part. Of several levels of detail the highest is taken. Vertices become floats once,
+ * after the scale, the translation and our own offset have been applied in double. */
 #include <jansson.h>
 #include <math.h>
 #include <stdlib.h>
@@ -14,7 +13,7 @@
 #include "readers.h"
 
 typedef struct city {
-    const char *name; /* of the file, for error texts */
+    const char *name;   /* of the file, for error texts */
     const char *object; /* the city object at hand */
     umb_error *error;
     model *into;
@@ -41,8 +40,8 @@ static bool short_of_memory(city *c)
 /* A wrong value, told with the object that holds it. */
 static bool wrong(city *c, const char *what)
 {
-    return model_fail(c->error, UMB_ERROR_FORMAT, "%s: object %.80s: %s; validate the file with cjio", c->name,
-                      c->object, what);
+    return model_fail(c->error, UMB_ERROR_FORMAT,
+                      "%s: object %.80s: %s; validate the file with cjio", c->name, c->object, what);
 }
 
 static bool read_triple(const json_t *array, double out[3])
@@ -74,8 +73,8 @@ static bool read_vertices(city *c, const json_t *root)
     const json_t *table = json_object_get(root, "vertices");
     size_t count = json_array_size(table);
     if (!json_is_array(table) || count > UINT32_MAX / 2) {
-        return model_fail(c->error, UMB_ERROR_FORMAT, "%s: vertices: no list of vertices; is this CityJSON?",
-                          c->name);
+        return model_fail(c->error, UMB_ERROR_FORMAT,
+                          "%s: vertices: no list of vertices; is this CityJSON?", c->name);
     }
     c->vertex_count = (uint32_t)count;
     c->vertices = malloc((count + 1) * sizeof *c->vertices);
@@ -89,9 +88,10 @@ static bool read_vertices(city *c, const json_t *root)
     double max[3] = {0};
     for (size_t v = 0; v < count; ++v) {
         if (!read_triple(json_array_get(table, v), c->corners[v])) {
-            return model_fail(c->error, UMB_ERROR_FORMAT,
-                              "%s: vertices: number %zu is no list of three numbers; validate the file with cjio",
-                              c->name, v);
+            return model_fail(
+                c->error, UMB_ERROR_FORMAT,
+                "%s: vertices: number %zu is no list of three numbers; validate the file with cjio",
+                c->name, v);
         }
         for (int k = 0; k < 3; ++k) {
             double x = c->corners[v][k] * scale[k] + translate[k];
@@ -117,7 +117,8 @@ static bool read_materials(city *c, const json_t *root)
     }
     c->glass_count = count;
     for (size_t i = 0; i < count; ++i) {
-        c->glass[i] = json_number_value(json_object_get(json_array_get(list, i), "transparency")) > 0.0;
+        c->glass[i] = json_number_value(json_object_get(json_array_get(list, i), "transparency")) >
+                      0.0;
     }
     return true;
 }
@@ -126,15 +127,16 @@ static bool read_materials(city *c, const json_t *root)
 static bool is_glass(const city *c, const json_t *material)
 {
     return json_is_integer(material) && json_integer_value(material) >= 0 &&
-           (uint64_t)json_integer_value(material) < c->glass_count && c->glass[json_integer_value(material)];
+           (uint64_t)json_integer_value(material) < c->glass_count &&
+           c->glass[json_integer_value(material)];
 }
 
-/* Lists that run beside a geometry's boundaries, followed level by level. A list that ends early, or
- * says null for a whole level, says nothing. */
+/* Lists that run beside a geometry's boundaries, followed level by level. A list that ends
+ * early, or says null for a whole level, says nothing. */
 #define THEME_LIMIT 8
 
 typedef struct beside {
-    const json_t *semantics;  /* numbers into types */
+    const json_t *semantics; /* numbers into types */
     const json_t *types;
     const json_t *materials[THEME_LIMIT];
     bool glass; /* one material for the whole geometry, and one sees through it */
@@ -153,7 +155,8 @@ static beside beside_at(const beside *b, size_t i)
 static beside beside_start(const city *c, const json_t *geometry)
 {
     const json_t *semantics = json_object_get(geometry, "semantics");
-    beside b = {.semantics = json_object_get(semantics, "values"), .types = json_object_get(semantics, "surfaces")};
+    beside b = {.semantics = json_object_get(semantics, "values"),
+                .types = json_object_get(semantics, "surfaces")};
     const char *theme;
     json_t *entry;
     int themes = 0;
@@ -174,8 +177,8 @@ static uint8_t surface_flags(const city *c, const beside *b)
         open = open || is_glass(c, b->materials[k]);
     }
     if (json_is_integer(b->semantics) && json_integer_value(b->semantics) >= 0) {
-        const json_t *type =
-            json_object_get(json_array_get(b->types, (size_t)json_integer_value(b->semantics)), "type");
+        const json_t *type = json_object_get(
+            json_array_get(b->types, (size_t)json_integer_value(b->semantics)), "type");
         open = open || (json_is_string(type) && strcmp(json_string_value(type), "Window") == 0);
     }
     return open ? UMB_TRIANGLE_OPEN : 0;
@@ -196,7 +199,8 @@ static bool reserve_surface(city *c, size_t corners, size_t rings)
         c->ring_starts = malloc((c->ring_room + 1) * sizeof *c->ring_starts);
         c->cut = malloc((c->corner_room + 2 * c->ring_room + 1) * sizeof *c->cut);
     }
-    return (c->ring_corners != NULL && c->ring_vertices != NULL && c->ring_starts != NULL && c->cut != NULL) ||
+    return (c->ring_corners != NULL && c->ring_vertices != NULL && c->ring_starts != NULL &&
+            c->cut != NULL) ||
            short_of_memory(c);
 }
 
@@ -286,7 +290,8 @@ static bool read_surface(city *c, const json_t *surface, const beside *b)
     if (!read_rings(c, surface, &rings)) {
         return false;
     }
-    polygon p = {.corners = (const double(*)[3])c->ring_corners, .starts = c->ring_starts, .rings = rings};
+    polygon p = {
+        .corners = (const double(*)[3])c->ring_corners, .starts = c->ring_starts, .rings = rings};
     bool sound;
     uint32_t count = polygon_triangulate(&p, c->cut, &sound);
     if (count == UINT32_MAX) {
@@ -299,8 +304,8 @@ static bool read_surface(city *c, const json_t *surface, const beside *b)
     uint8_t flags = surface_flags(c, b) | (sound ? 0 : UMB_TRIANGLE_OPEN);
     for (uint32_t t = 0; t < count; ++t) {
         for (int k = 0; k < 3; ++k) {
-            c->mesh.indices[3 * (size_t)c->mesh.triangle_count + k] =
-                local_vertex(c, c->ring_vertices[c->cut[t][k]]);
+            c->mesh.indices[3 * (size_t)c->mesh.triangle_count + k] = local_vertex(
+                c, c->ring_vertices[c->cut[t][k]]);
         }
         c->mesh.flags[c->mesh.triangle_count++] = flags;
     }
@@ -330,7 +335,8 @@ static int surface_depth(const json_t *geometry)
         const char *type;
         int depth;
     } types[] = {
-        {"MultiSurface", 1}, {"CompositeSurface", 1}, {"Solid", 2}, {"MultiSolid", 3}, {"CompositeSolid", 3},
+        {"MultiSurface", 1}, {"CompositeSurface", 1}, {"Solid", 2},
+        {"MultiSolid", 3},   {"CompositeSolid", 3},
     };
     const char *type = json_string_value(json_object_get(geometry, "type"));
     for (size_t i = 0; type != NULL && i < sizeof types / sizeof types[0]; ++i) {
@@ -386,7 +392,8 @@ static bool read_objects(city *c, json_t *root)
 {
     json_t *objects = json_object_get(root, "CityObjects");
     if (!json_is_object(objects)) {
-        return model_fail(c->error, UMB_ERROR_FORMAT, "%s: no CityObjects in it; is this CityJSON?", c->name);
+        return model_fail(c->error, UMB_ERROR_FORMAT, "%s: no CityObjects in it; is this CityJSON?",
+                          c->name);
     }
     const char *name;
     json_t *object;
@@ -420,8 +427,8 @@ static bool read_city(city *c, json_t *root, const model_options *options)
 {
     const json_t *type = json_object_get(root, "type");
     if (!json_is_string(type) || strcmp(json_string_value(type), "CityJSON") != 0) {
-        return model_fail(c->error, UMB_ERROR_FORMAT, "%s: JSON whose type is not CityJSON; use a CityJSON file",
-                          c->name);
+        return model_fail(c->error, UMB_ERROR_FORMAT,
+                          "%s: JSON whose type is not CityJSON; use a CityJSON file", c->name);
     }
     c->into = model_create();
     if (c->into == NULL) {
@@ -436,14 +443,15 @@ static bool read_city(city *c, json_t *root, const model_options *options)
     return model_finish(c->into, options, c->error);
 }
 
-model *read_cityjson(const uint8_t *data, size_t size, const char *name, const model_options *options,
-                     umb_error *error)
+model *read_cityjson(const uint8_t *data, size_t size, const char *name,
+                     const model_options *options, umb_error *error)
 {
     json_error_t where;
     json_t *root = json_loadb((const char *)data, size, 0, &where);
     if (root == NULL) {
-        model_fail(error, UMB_ERROR_FORMAT, "%s:%d:%d: not JSON: %.100s; validate the file with cjio", name,
-                   where.line, where.column, where.text);
+        model_fail(error, UMB_ERROR_FORMAT,
+                   "%s:%d:%d: not JSON: %.100s; validate the file with cjio", name, where.line,
+                   where.column, where.text);
         return NULL;
     }
     city c = {.name = name, .object = "", .error = error};

@@ -1,8 +1,7 @@
 /* Quake maps (BSP29).
  *
- * Leaf 0 is the solid outside; object i is leaf i + 1 of the world, which is also bit i of the map's own
- * visibility. Then come the sub-models 1, 2, ...: doors, lifts, triggers.
- */
+ * Leaf 0 is the solid outside; object i is leaf i + 1 of the world, which is also bit i of the
+ * map's own visibility. Then come the sub-models 1, 2, ...: doors, lifts, triggers. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,7 +12,8 @@
 #include "polygon.h"
 #include "readers.h"
 
-/* The game's own compilers write at most 64 sides; larger faces of hostile files are not worth care. */
+/* The game's own compilers write at most 64 sides; larger faces of hostile files are not worth
+ * care. */
 #define SMALL_FACE 64
 
 typedef struct q1_map {
@@ -27,10 +27,14 @@ static bool read_lumps(bsp_scene *s, const uint8_t *data, size_t size, q1_map *m
         const char *what;
         bsp_lump *lump;
     } wanted[] = {
-        {2, 1, "textures", &map->textures},     {3, 12, "vertices", &map->vertices},
-        {6, 40, "texture places", &map->texinfo}, {7, 20, "faces", &map->faces},
-        {10, 28, "leaves", &map->leaves},       {11, 2, "leaf faces", &map->mark_surfaces},
-        {12, 4, "edges", &map->edges},          {13, 4, "face edges", &map->surf_edges},
+        {2, 1, "textures", &map->textures},
+        {3, 12, "vertices", &map->vertices},
+        {6, 40, "texture places", &map->texinfo},
+        {7, 20, "faces", &map->faces},
+        {10, 28, "leaves", &map->leaves},
+        {11, 2, "leaf faces", &map->mark_surfaces},
+        {12, 4, "edges", &map->edges},
+        {13, 4, "face edges", &map->surf_edges},
         {14, 64, "models", &map->models},
     };
     for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; ++i) {
@@ -40,7 +44,8 @@ static bool read_lumps(bsp_scene *s, const uint8_t *data, size_t size, q1_map *m
         }
     }
     if (map->models.count == 0) {
-        return model_fail(s->error, UMB_ERROR_FORMAT, "%s: lump 14 (models) is empty; use another map", s->name);
+        return model_fail(s->error, UMB_ERROR_FORMAT,
+                          "%s: lump 14 (models) is empty; use another map", s->name);
     }
     return true;
 }
@@ -59,7 +64,8 @@ static void texture_name(const q1_map *map, uint32_t number, char name[16])
     }
 }
 
-/* Liquids start with a star; triggers are invisible to players, fences ({) are cut out by the texture. */
+/* Liquids start with a star; triggers are invisible to players, fences ({) are cut out by the
+ * texture. */
 static bool see_through(const char *texture)
 {
     return texture[0] == '*' || texture[0] == '{' || strcasecmp(texture, "trigger") == 0;
@@ -73,17 +79,19 @@ static bool face_corner(bsp_scene *s, const q1_map *map, uint32_t face, uint32_t
     bool backwards = signed_edge >> 31 != 0;
     uint32_t edge = backwards ? 0u - signed_edge : signed_edge;
     if (edge >= map->edges.count) {
-        return model_fail(s->error, UMB_ERROR_FORMAT, "%s: face %u names edge %u of %u; use another map", s->name,
-                          face, edge, map->edges.count);
+        return model_fail(s->error, UMB_ERROR_FORMAT,
+                          "%s: face %u names edge %u of %u; use another map", s->name, face, edge,
+                          map->edges.count);
     }
     *vertex = le16(map->edges.data + 4 * (size_t)edge + (backwards ? 2 : 0));
     return *vertex < s->position_count ||
-           model_fail(s->error, UMB_ERROR_FORMAT, "%s: edge %u names vertex %u of %u; use another map", s->name, edge,
-                      *vertex, s->position_count);
+           model_fail(s->error, UMB_ERROR_FORMAT,
+                      "%s: edge %u names vertex %u of %u; use another map", s->name, edge, *vertex,
+                      s->position_count);
 }
 
-/* The map compiler puts corners into the middle of straight sides, where neighbours meet them. A plain
- * fan would make slivers of no area there, and leave the sides' halves without a triangle. */
+/* The map compiler puts corners into the middle of straight sides, where neighbours meet them. A
+ * plain fan would make slivers of no area there, and leave the sides' halves without a triangle. */
 static bool add_small_face(bsp_scene *s, const uint32_t *ring, uint32_t sides)
 {
     double corners[SMALL_FACE][3];
@@ -126,9 +134,10 @@ static bool read_face(bsp_scene *s, const q1_map *map, uint32_t number, bool sky
     uint32_t sides = le16(face + 8);
     uint32_t texinfo = le16(face + 10);
     if (!bsp_range(le32(face + 4), sides, map->surf_edges.count) || texinfo >= map->texinfo.count) {
-        return model_fail(s->error, UMB_ERROR_FORMAT,
-                          "%s: face %u names edges or a texture that are not there; use another map", s->name,
-                          number);
+        return model_fail(
+            s->error, UMB_ERROR_FORMAT,
+            "%s: face %u names edges or a texture that are not there; use another map", s->name,
+            number);
     }
     char texture[16];
     texture_name(map, le32(map->texinfo.data + 40 * (size_t)texinfo + 32), texture);
@@ -141,7 +150,8 @@ static bool read_face(bsp_scene *s, const q1_map *map, uint32_t number, bool sky
             return false;
         }
     }
-    bool added = sides <= SMALL_FACE ? add_small_face(s, ring, sides) : add_large_face(s, ring, sides);
+    bool added = sides <= SMALL_FACE ? add_small_face(s, ring, sides)
+                                     : add_large_face(s, ring, sides);
     surface->count = s->triangle_count - surface->first;
     return added;
 }
@@ -167,7 +177,8 @@ static bool read_surfaces(bsp_scene *s, const q1_map *map, bool sky)
 }
 
 /* The faces of leaf number into list, which has room for all mark surfaces. False: out of range. */
-static bool leaf_faces(bsp_scene *s, const q1_map *map, uint32_t number, uint32_t *list, uint32_t *count)
+static bool leaf_faces(bsp_scene *s, const q1_map *map, uint32_t number, uint32_t *list,
+                       uint32_t *count)
 {
     const uint8_t *leaf = map->leaves.data + 28 * (size_t)number;
     uint32_t first = le16(leaf + 20);
@@ -177,7 +188,8 @@ static bool leaf_faces(bsp_scene *s, const q1_map *map, uint32_t number, uint32_
         list[i] = le16(map->mark_surfaces.data + 2 * (size_t)(first + i));
         inside = list[i] < s->surface_count;
     }
-    return inside || model_fail(s->error, UMB_ERROR_FORMAT, "%s: leaf %u names faces that are not there; use another map",
+    return inside || model_fail(s->error, UMB_ERROR_FORMAT,
+                                "%s: leaf %u names faces that are not there; use another map",
                                 s->name, number);
 }
 
@@ -185,8 +197,9 @@ static bool add_objects(bsp_scene *s, const q1_map *map, uint32_t *list)
 {
     uint32_t leaves = le32(map->models.data + 52);
     if (leaves >= map->leaves.count && leaves != 0) {
-        return model_fail(s->error, UMB_ERROR_FORMAT, "%s: the world claims %u leaves of %u; use another map",
-                          s->name, leaves, map->leaves.count);
+        return model_fail(s->error, UMB_ERROR_FORMAT,
+                          "%s: the world claims %u leaves of %u; use another map", s->name, leaves,
+                          map->leaves.count);
     }
     char name[32];
     for (uint32_t i = 1; i <= leaves; ++i) {
@@ -201,7 +214,8 @@ static bool add_objects(bsp_scene *s, const q1_map *map, uint32_t *list)
         uint32_t count = le32(map->models.data + 64 * (size_t)i + 60);
         if (!bsp_range(first, count, s->surface_count)) {
             return model_fail(s->error, UMB_ERROR_FORMAT,
-                              "%s: model %u names faces that are not there; use another map", s->name, i);
+                              "%s: model %u names faces that are not there; use another map",
+                              s->name, i);
         }
         for (uint32_t k = 0; k < count; ++k) {
             list[k] = first + k;
@@ -220,7 +234,8 @@ model *read_q1bsp(const uint8_t *data, size_t size, const char *name, const mode
     bsp_scene s = {.name = name, .error = error};
     q1_map map;
     if (size < 4 || le32(data) != 29) {
-        model_fail(error, UMB_ERROR_FORMAT, "%s: at byte 0: not a Quake map of version 29; use another map", name);
+        model_fail(error, UMB_ERROR_FORMAT,
+                   "%s: at byte 0: not a Quake map of version 29; use another map", name);
         return NULL;
     }
     uint32_t *list = NULL;

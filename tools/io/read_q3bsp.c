@@ -1,8 +1,7 @@
 /* Quake 3 maps (IBSP 46), OpenArena's among them.
  *
- * Object i is leaf cluster i; then come the sub-models 1, 2, ...: doors, platforms, triggers. A face lies
- * in every cluster that one of its leaves belongs to.
- */
+ * Object i is leaf cluster i; then come the sub-models 1, 2, ...: doors, platforms, triggers. A
+ * face lies in every cluster that one of its leaves belongs to. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -42,9 +41,9 @@ static bool read_lumps(bsp_scene *s, const uint8_t *data, size_t size, q3_map *m
         const char *what;
         bsp_lump *lump;
     } wanted[] = {
-        {1, 72, "textures", &map->textures}, {4, 48, "leaves", &map->leaves},
+        {1, 72, "textures", &map->textures},    {4, 48, "leaves", &map->leaves},
         {5, 4, "leaf faces", &map->leaf_faces}, {7, 40, "models", &map->models},
-        {10, 44, "vertices", &map->vertices}, {11, 4, "mesh vertices", &map->indices},
+        {10, 44, "vertices", &map->vertices},   {11, 4, "mesh vertices", &map->indices},
         {13, 104, "faces", &map->faces},
     };
     for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; ++i) {
@@ -54,24 +53,31 @@ static bool read_lumps(bsp_scene *s, const uint8_t *data, size_t size, q3_map *m
         }
     }
     if (map->models.count == 0) {
-        return model_fail(s->error, UMB_ERROR_FORMAT, "%s: lump 7 (models) is empty; use another map", s->name);
+        return model_fail(s->error, UMB_ERROR_FORMAT,
+                          "%s: lump 7 (models) is empty; use another map", s->name);
     }
     return true;
 }
 
 static bool bad_face(bsp_scene *s, uint32_t number, const char *what)
 {
-    return model_fail(s->error, UMB_ERROR_FORMAT, "%s: face %u %s; use another map", s->name, number, what);
+    return model_fail(s->error, UMB_ERROR_FORMAT, "%s: face %u %s; use another map", s->name,
+                      number, what);
 }
 
-/* Point (i, j) of the tessellated patch. A quadratic Bezier curve at quarter steps has weights that are
- * sixteenths, so the products are exact in double, and so are nearly always the sums: a border that two
- * patches share gives the same floats from either side. */
-static void patch_point(const bsp_scene *s, uint32_t first, uint32_t width, uint32_t i, uint32_t j, float out[3])
+/* Point (i, j) of the tessellated patch. A quadratic Bezier curve at quarter steps has weights
+ * that are sixteenths, so the products are exact in double, and so are nearly always the sums: a
+ * border that two patches share gives the same floats from either side. */
+static void patch_point(const bsp_scene *s, uint32_t first, uint32_t width, uint32_t i, uint32_t j,
+                        float out[3])
 {
-    static const double weight[PATCH_STEPS + 1][3] = {
-        {1.0, 0.0, 0.0}, {0.5625, 0.375, 0.0625}, {0.25, 0.5, 0.25}, {0.0625, 0.375, 0.5625}, {0.0, 0.0, 1.0}};
-    /* The last point of a block is the first of the next: same control point, same weights reversed. */
+    static const double weight[PATCH_STEPS + 1][3] = {{1.0, 0.0, 0.0},
+                                                      {0.5625, 0.375, 0.0625},
+                                                      {0.25, 0.5, 0.25},
+                                                      {0.0625, 0.375, 0.5625},
+                                                      {0.0, 0.0, 1.0}};
+    /* The last point of a block is the first of the next: same control point, same weights
+     * reversed. */
     uint32_t column = i / PATCH_STEPS;
     uint32_t row = j / PATCH_STEPS;
     const double *across = weight[i % PATCH_STEPS];
@@ -118,7 +124,8 @@ static bool read_patch(bsp_scene *s, const uint8_t *face, uint32_t number)
         for (uint32_t i = 0; i < across; ++i) {
             uint32_t v = base + j * (across + 1) + i;
             uint32_t below = v + across + 1;
-            if (!bsp_add_triangle(s, v, v + 1, below) || !bsp_add_triangle(s, v + 1, below + 1, below)) {
+            if (!bsp_add_triangle(s, v, v + 1, below) ||
+                !bsp_add_triangle(s, v + 1, below + 1, below)) {
                 return false;
             }
         }
@@ -173,7 +180,8 @@ static bool read_face(bsp_scene *s, const q3_map *map, uint32_t number, bool sky
     if (type == FACE_BILLBOARD) {
         return true; /* a glow that turns to the eye: no surface */
     }
-    if (le32(face) >= map->textures.count || !bsp_range(le32(face + 12), le32(face + 16), map->vertices.count)) {
+    if (le32(face) >= map->textures.count ||
+        !bsp_range(le32(face + 12), le32(face + 16), map->vertices.count)) {
         return bad_face(s, number, "names vertices or a texture that are not there");
     }
     read_texture(map, le32(face), sky, surface);
@@ -214,10 +222,11 @@ typedef struct cluster_faces {
     uint32_t count;
 } cluster_faces;
 
-/* Visit the leaves; each face of the world that lies in cluster c is put at start[c]++ of list. Without a
- * list, only count them: start[c + 1]++. Leaves of sub-models stand among the others, with clusters that
- * mean nothing; their faces are not the world's. */
-static uint64_t visit_leaves(const q3_map *map, uint32_t world_first, uint32_t world_count, cluster_faces *by)
+/* Visit the leaves; each face of the world that lies in cluster c is put at start[c]++ of list.
+ * Without a list, only count them: start[c + 1]++. Leaves of sub-models stand among the others,
+ * with clusters that mean nothing; their faces are not the world's. */
+static uint64_t visit_leaves(const q3_map *map, uint32_t world_first, uint32_t world_count,
+                             cluster_faces *by)
 {
     uint64_t total = 0;
     for (uint32_t i = 0; i < map->leaves.count; ++i) {
@@ -258,9 +267,10 @@ static bool check_leaves(bsp_scene *s, const q3_map *map, cluster_faces *by)
         bool none = cluster >> 31 != 0;
         if (!bsp_range(le32(leaf + 32), count, map->leaf_faces.count) ||
             (!none && cluster >= map->leaves.count)) {
-            return model_fail(s->error, UMB_ERROR_FORMAT,
-                              "%s: leaf %u names faces or a cluster that are not there; use another map", s->name,
-                              i);
+            return model_fail(
+                s->error, UMB_ERROR_FORMAT,
+                "%s: leaf %u names faces or a cluster that are not there; use another map", s->name,
+                i);
         }
         named += count;
         if (!none && cluster >= by->count) {
@@ -270,11 +280,13 @@ static bool check_leaves(bsp_scene *s, const q3_map *map, cluster_faces *by)
     for (uint32_t i = 0; i < map->leaf_faces.count; ++i) {
         if (le32(map->leaf_faces.data + 4 * (size_t)i) >= s->surface_count) {
             return model_fail(s->error, UMB_ERROR_FORMAT,
-                              "%s: leaf face %u names a face that is not there; use another map", s->name, i);
+                              "%s: leaf face %u names a face that is not there; use another map",
+                              s->name, i);
         }
     }
     return named <= LEAF_FACE_LIMIT ||
-           model_fail(s->error, UMB_ERROR_LIMIT, "%s: its leaves name too many faces; use another map", s->name);
+           model_fail(s->error, UMB_ERROR_LIMIT,
+                      "%s: its leaves name too many faces; use another map", s->name);
 }
 
 static bool sort_faces(bsp_scene *s, const q3_map *map, uint32_t world_first, uint32_t world_count,
@@ -313,7 +325,8 @@ static bool add_objects(bsp_scene *s, const q3_map *map, const cluster_faces *by
         uint32_t count = le32(map->models.data + 40 * (size_t)i + 28);
         if (!bsp_range(first, count, s->surface_count)) {
             return model_fail(s->error, UMB_ERROR_FORMAT,
-                              "%s: model %u names faces that are not there; use another map", s->name, i);
+                              "%s: model %u names faces that are not there; use another map",
+                              s->name, i);
         }
         for (uint32_t k = 0; k < count; ++k) {
             list[k] = first + k;
@@ -332,8 +345,9 @@ static bool read_objects(bsp_scene *s, const q3_map *map)
     uint32_t world_first = le32(map->models.data + 24);
     uint32_t world_count = le32(map->models.data + 28);
     uint32_t *list = malloc(((size_t)s->surface_count + 1) * sizeof *list);
-    bool read = (list != NULL || model_fail_memory(s->error, s->name)) && check_leaves(s, map, &by) &&
-                sort_faces(s, map, world_first, world_count, &by) && add_objects(s, map, &by, list);
+    bool read = (list != NULL || model_fail_memory(s->error, s->name)) &&
+                check_leaves(s, map, &by) && sort_faces(s, map, world_first, world_count, &by) &&
+                add_objects(s, map, &by, list);
     free(by.start);
     free(by.list);
     free(list);
@@ -344,7 +358,8 @@ model *read_q3bsp(const uint8_t *data, size_t size, const char *name, const mode
                   umb_error *error)
 {
     if (size < 8 || memcmp(data, "IBSP", 4) != 0 || le32(data + 4) != 46) {
-        model_fail(error, UMB_ERROR_FORMAT, "%s: at byte 0: not a Quake 3 map (IBSP 46); use another map", name);
+        model_fail(error, UMB_ERROR_FORMAT,
+                   "%s: at byte 0: not a Quake 3 map (IBSP 46); use another map", name);
         return NULL;
     }
     bsp_scene s = {.name = name, .error = error};

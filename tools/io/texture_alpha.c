@@ -54,7 +54,8 @@ static bool header_has_alpha(const char *path)
     if (size >= 12 && head[0] == 0x01 && head[1] == 0xDA) { /* SGI: two or four channels */
         return head[11] == 2 || head[11] == 4;
     }
-    if (size >= 128 && memcmp(head, "DDS ", 4) == 0) { /* alpha bits, or a compression that has them */
+    if (size >= 128 && memcmp(head, "DDS ", 4) == 0) {
+        /* Bits of alpha, or a compression that has them. */
         return (head[80] & 1) != 0 || (memcmp(head + 84, "DXT", 3) == 0 && head[87] != '1');
     }
     const char *dot = strrchr(path, '.');

@@ -11,8 +11,9 @@ typedef struct texture_alphas {
     uint32_t count;
 } texture_alphas;
 
-/* True if the picture that a scene file names has a pixel that is not opaque; where only the header is read
- * (TGA, SGI, DDS), if it has room for such pixels. False if it is not there or of another kind. */
+/* True if the picture that a scene file names has a pixel that is not opaque; where only the
+ * header is read (TGA, SGI, DDS), if it has room for such pixels. False if it is not there or of
+ * another kind. */
 bool texture_has_alpha(texture_alphas *known, const char *scene, const char *texture);
 
 void texture_alphas_free(texture_alphas *known);
