@@ -25,6 +25,8 @@
 #include "occlusion/image.h"
 #include "occlusion/method.h"
 
+#define LEAST_PIXELS 2
+
 struct umb_culler {
     umb_allocator allocator;
     const umb_index *index;
@@ -206,13 +208,17 @@ static void open_node(walk *w, uint32_t number, uint16_t planes)
     }
 }
 
-static void draw(walk *w, uint32_t occluder)
+/* Draw an occluder, unless its box's image is too small to cover anything worth having: a silhouette of
+ * three pixels across covers one at most. */
+static void draw(walk *w, uint32_t occluder, const umb_waiting *item)
 {
     const umb_culler *c = w->culler;
-    if (c->ops != NULL && occluder != UMB_NONE &&
-        c->ops->occlude(c->method, occluder, &w->stats)) {
-        w->drawn += 1;
+    const umb_pixel_rect *r = &item->image.rect;
+    if (c->ops == NULL || occluder == UMB_NONE ||
+        (item->testable && (r->x1 - r->x0 < LEAST_PIXELS || r->y1 - r->y0 < LEAST_PIXELS))) {
+        return;
     }
+    w->drawn += c->ops->occlude(c->method, occluder, &w->stats);
 }
 
 /* True if the object is its shape, so that its parts and triangles say more than its box. */
@@ -299,7 +305,7 @@ static void visit_object(walk *w, umb_waiting *item)
         return;
     }
     if (!item->drawn) {
-        draw(w, o->occluder);
+        draw(w, o->occluder, item);
         item->drawn = true;
     }
     if (w->culler->ops == NULL || !(item->settled > item->key)) {
@@ -329,7 +335,7 @@ static void run(walk *w)
             open_node(w, item.ref & UMB_REF_NUMBER, item.planes);
             break;
         case UMB_REF_OCCLUDER:
-            draw(w, item.ref & UMB_REF_NUMBER);
+            draw(w, item.ref & UMB_REF_NUMBER, &item);
             break;
         default:
             visit_object(w, &item);
@@ -373,6 +379,10 @@ umb_result umb_cull(umb_culler *c, const umb_view *view, umb_visible_set *out)
     }
     walk w;
     prepare_walk(&w, c, view);
+    if (w.tree->version != w.scene->version) {
+        return umb_error_set(c->def.error, UMB_ERROR_STATE,
+                             "the index found no memory at the last commit: commit again");
+    }
     if (!reserve(c, w.tree, w.scene) ||
         (c->ops != NULL && c->ops->prepare(c->method, &w.map, w.scene) != UMB_OK)) {
         return umb_error_set(c->def.error, UMB_ERROR_MEMORY, "no memory for the frame");

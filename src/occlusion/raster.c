@@ -215,9 +215,6 @@ typedef enum overlap {
 /* How a triangle's image lies to the closed sub-tile at (x, y). */
 static overlap place_sub_tile(const umb_depth_triangle *t, double x, double y)
 {
-    if (t->x_max < x || t->x_min > x + 8.0 || t->y_max < y || t->y_min > y + 4.0) {
-        return BESIDE;
-    }
     bool holds = t->side_count > 0;
     for (uint32_t i = 0; i < t->side_count; ++i) {
         double at = t->ex[i] * x + t->ey[i] * y + t->e0[i];
@@ -232,19 +229,34 @@ static overlap place_sub_tile(const umb_depth_triangle *t, double x, double y)
     return holds ? HOLDS : TOUCHES;
 }
 
+/* First and last of count sub-tiles of a size, from an origin, that [low, high] meets; ends clamped. */
+static void sub_tile_range(double low, double high, double origin, double size, int count, int *first, int *last)
+{
+    double f = (low - origin) / size - 1e-9, l = (high - origin) / size + 1e-9;
+    *first = f > 0.0 ? (int)f : 0;
+    *last = l < count ? (int)l : count - 1;
+}
+
 /* All that touch a sub-tile bound its depth together, from the farthest; one that holds all of it does so
  * alone, however far the others are. */
 static void lower_tile(window_tile *tile, const umb_depth_triangle *t, uint32_t tx, uint32_t ty)
 {
-    for (uint32_t s = 0; s < 8; ++s) {
-        double x = tx * UMB_TILE_WIDTH + 8.0 * (s % 4), y = ty * UMB_TILE_HEIGHT + 4.0 * (s / 4);
-        overlap place = place_sub_tile(t, x, y);
-        if (place == BESIDE) {
-            continue;
+    double x0 = tx * UMB_TILE_WIDTH, y0 = ty * UMB_TILE_HEIGHT;
+    int i0, i1, j0, j1;
+    sub_tile_range(t->x_min, t->x_max, x0, 8.0, 4, &i0, &i1);
+    sub_tile_range(t->y_min, t->y_max, y0, 4.0, 2, &j0, &j1);
+    for (int j = j0; j <= j1; ++j) {
+        for (int i = i0; i <= i1; ++i) {
+            double x = x0 + 8.0 * i, y = y0 + 4.0 * j;
+            overlap place = place_sub_tile(t, x, y);
+            if (place == BESIDE) {
+                continue;
+            }
+            int s = 4 * j + i;
+            float z = farthest_in(t, x, y);
+            tile->z[s] = z < tile->z[s] ? z : tile->z[s];
+            tile->held[s] = place == HOLDS && z > tile->held[s] ? z : tile->held[s];
         }
-        float z = farthest_in(t, x, y);
-        tile->z[s] = z < tile->z[s] ? z : tile->z[s];
-        tile->held[s] = place == HOLDS && z > tile->held[s] ? z : tile->held[s];
     }
 }
 
