@@ -100,7 +100,7 @@ void umb_culler_destroy(umb_culler *c)
     if (c->ops != NULL) {
         c->ops->destroy(c->method);
     }
-    umb_memory_free(&a, c->heap.items, c->heap.capacity * sizeof *c->heap.items);
+    umb_heap_free(&c->heap, &a);
     umb_memory_free(&a, c->found, c->found_capacity * sizeof *c->found);
     umb_memory_free(&a, c->objects, c->object_capacity * sizeof *c->objects);
     umb_memory_free(&a, c->inside, c->inside_capacity);
@@ -113,8 +113,7 @@ static bool reserve(umb_culler *c, const umb_tree *tree, const umb_committed *sc
 {
     const umb_allocator *a = &c->allocator;
     size_t planes = c->plane_capacity;
-    if (!umb_memory_reserve(a, (void **)&c->heap.items, &c->heap.capacity,
-                            (size_t)tree->item_count + tree->node_count, sizeof *c->heap.items) ||
+    if (!umb_heap_reserve(&c->heap, a, (size_t)tree->item_count + tree->node_count) ||
         !umb_memory_reserve(a, (void **)&c->found, &c->found_capacity, scene->object_count,
                             sizeof *c->found) ||
         !umb_memory_reserve(a, (void **)&c->objects, &c->object_capacity, scene->object_count,
@@ -164,12 +163,12 @@ static bool too_small(walk *w, uint32_t ref, const umb_image_bounds *b)
 static void consider(walk *w, const umb_node *node, const umb_projected *p, uint32_t slot, uint16_t planes)
 {
     umb_waiting item = {0};
-    item.key = item.nearest = p->w_min[slot];
+    item.nearest = p->w_min[slot];
     item.settled = p->w_max[slot] < w->map.far_depth ? p->w_max[slot] : w->map.far_depth;
     item.ref = node->ref[slot];
     item.planes = planes;
     item.stamp = w->drawn;
-    item.testable = p->w_min[slot] >= w->map.near_depth && (w->map.orthographic || p->w_min[slot] > 0.0);
+    item.testable = item.nearest >= w->map.near_depth && (w->map.orthographic || item.nearest > 0.0);
     w->stats.in_frustum += (item.ref & UMB_REF_KIND) == UMB_REF_OBJECT;
     if (item.testable) {
         umb_image_bounds b = {p->x_min[slot], p->y_min[slot], p->x_max[slot], p->y_max[slot],
@@ -183,7 +182,10 @@ static void consider(walk *w, const umb_node *node, const umb_projected *p, uint
             return;
         }
     }
-    umb_heap_push(&w->culler->heap, &item);
+    umb_heap *heap = &w->culler->heap;
+    uint32_t taken = umb_heap_take(heap);
+    heap->slots[taken] = item;
+    umb_heap_push(heap, item.nearest, taken);
 }
 
 static void open_node(walk *w, uint32_t number, uint16_t planes)
@@ -228,34 +230,60 @@ static bool refinable(const walk *w, const umb_object *o)
 }
 
 /* True if a triangle of a leaf may be seen; *settled becomes the greatest view depth in view of the first
- * that may. */
+ * that may. Those that face the eye are asked first: one of them shows most visible things. */
 static bool triangles_show(walk *w, const umb_object *o, uint32_t ref, const umb_part *part, double *settled)
 {
-    for (uint32_t i = part->begin; i < part->end; ++i) {
-        const uint32_t *corner = o->mesh->triangles[o->mesh->part_order[i]];
-        float world[3][3];
-        for (int k = 0; k < 3; ++k) {
-            const float *p = o->mesh->positions[corner[k]];
-            if (o->identity) {
-                memcpy(world[k], p, sizeof world[k]);
-            } else {
-                umb_transform_point(&o->transform, p, world[k]);
+    const umb_mesh *mesh = o->mesh;
+    for (int away = 0; away < 2; ++away) {
+        for (uint32_t i = part->begin; i < part->end; ++i) {
+            const uint32_t *corner = mesh->triangles[mesh->part_order[i]];
+            float world[3][3];
+            for (int k = 0; k < 3; ++k) {
+                if (o->identity) {
+                    memcpy(world[k], mesh->positions[corner[k]], sizeof world[k]);
+                } else {
+                    umb_transform_point(&o->transform, mesh->positions[corner[k]], world[k]);
+                }
             }
-        }
-        umb_image_bounds b;
-        umb_outline outline;
-        umb_depth_place place =
-            umb_outline_of_triangle(&w->map, (const float(*)[3])world, &outline, &b);
-        if (place == UMB_DEPTH_OUTSIDE) {
-            continue;
-        }
-        *settled = place == UMB_DEPTH_BEYOND ? b.w_max : -INFINITY;
-        umb_image image = umb_image_of_bounds(&w->map, &b);
-        if (place == UMB_DEPTH_CROSSING || !hidden(w, ref, &image, &outline)) {
-            return true;
+            umb_face face = umb_face_of(&w->map, world[0], world[1], world[2]);
+            if ((face.distance > 0.0) == (away != 0)) {
+                continue;
+            }
+            umb_image_bounds b;
+            umb_outline outline;
+            umb_depth_place place =
+                umb_outline_of_triangle(&w->map, (const float(*)[3])world, &face, &outline, &b);
+            if (place == UMB_DEPTH_OUTSIDE) {
+                continue;
+            }
+            *settled = place == UMB_DEPTH_BEYOND ? b.w_max : -INFINITY;
+            umb_image image = umb_image_of_bounds(&w->map, &b);
+            if (place == UMB_DEPTH_CROSSING || !hidden(w, ref, &image, &outline)) {
+                return true;
+            }
         }
     }
     return false;
+}
+
+/* True if a part may be seen, as far as its box tells. The first box of an object that is not turned is
+ * its bounds, which have been asked about just now. */
+static bool part_shows(walk *w, const umb_object *o, const umb_waiting *item)
+{
+    if (item->part == 0 && o->identity) {
+        return true;
+    }
+    umb_image_bounds b;
+    switch (umb_image_of_part(&w->map, &o->mesh->parts[item->part].box, &o->transform, o->identity, &b)) {
+    case UMB_DEPTH_OUTSIDE:
+        return false;
+    case UMB_DEPTH_CROSSING:
+        return true;
+    default: {
+        umb_image image = umb_image_of_bounds(&w->map, &b);
+        return !hidden(w, item->ref, &image, NULL);
+    }
+    }
 }
 
 /* Walk the parts from item->part on to the first that may be seen, and stay there: parts passed over are
@@ -266,20 +294,14 @@ static bool parts_show(walk *w, const umb_object *o, umb_waiting *item)
     while (item->part < mesh->part_count) {
         const umb_part *part = &mesh->parts[item->part];
         bool leaf = part->skip == item->part + 1;
-        umb_image_bounds b;
-        umb_depth_place place = umb_image_of_part(&w->map, &part->box, &o->transform, o->identity, &b);
-        bool over = place == UMB_DEPTH_OUTSIDE;
-        if (place == UMB_DEPTH_BEYOND) {
-            umb_image image = umb_image_of_bounds(&w->map, &b);
-            over = hidden(w, item->ref, &image, NULL);
+        bool shows = part_shows(w, o, item);
+        if (shows && leaf) {
+            shows = triangles_show(w, o, item->ref, part, &item->settled);
+            if (shows) {
+                return true;
+            }
         }
-        if (!over && leaf) {
-            over = !triangles_show(w, o, item->ref, part, &item->settled);
-        }
-        if (!over && leaf) {
-            return true;
-        }
-        item->part = over ? part->skip : item->part + 1;
+        item->part = shows ? item->part + 1 : part->skip;
     }
     return false;
 }
@@ -295,50 +317,50 @@ static void report(walk *w, const umb_waiting *item)
 
 /* An object whose turn has come. If something of it may be seen it becomes an occluder at once, but it is
  * reported only when everything nearer than the far end of what may be seen has been drawn: until then it
- * waits again, and may yet turn out to be hidden. */
-static void visit_object(walk *w, umb_waiting *item)
+ * waits again, and may yet turn out to be hidden. True if it waits. */
+static bool visit_object(walk *w, umb_waiting *item, const umb_heap_entry *entry)
 {
     const umb_object *o = &w->scene->objects[item->ref & UMB_REF_NUMBER];
     bool fresh = !(item->drawn && item->stamp == w->drawn);
     if (fresh && refinable(w, o) && !parts_show(w, o, item)) {
         w->stats.hidden_objects += 1;
-        return;
+        return false;
     }
     if (!item->drawn) {
         draw(w, o->occluder, item);
         item->drawn = true;
     }
-    if (w->culler->ops == NULL || !(item->settled > item->key)) {
+    if (w->culler->ops == NULL || !(item->settled > entry->key)) {
         report(w, item);
-        return;
+        return false;
     }
-    item->key = item->settled;
     item->stamp = w->drawn;
-    umb_heap_push(&w->culler->heap, item);
+    umb_heap_push(&w->culler->heap, item->settled, entry->slot);
+    return true;
 }
 
 static void run(walk *w)
 {
-    umb_culler *c = w->culler;
+    umb_heap *heap = &w->culler->heap;
     uint32_t roots = w->tree->flat ? w->tree->node_count : w->tree->node_count > 0;
     for (uint32_t i = 0; i < roots; ++i) {
         open_node(w, i, w->frustum.all_planes);
     }
-    while (c->heap.count > 0) {
-        umb_waiting item = umb_heap_pop(&c->heap);
-        if (item.testable && item.stamp != w->drawn && hidden(w, item.ref, &item.image, NULL)) {
-            count_hidden(w, item.ref);
-            continue;
+    while (heap->count > 0) {
+        umb_heap_entry entry = umb_heap_pop(heap);
+        umb_waiting *item = &heap->slots[entry.slot];
+        bool waits = false;
+        if (item->testable && item->stamp != w->drawn && hidden(w, item->ref, &item->image, NULL)) {
+            count_hidden(w, item->ref);
+        } else if ((item->ref & UMB_REF_KIND) == UMB_REF_NODE) {
+            open_node(w, item->ref & UMB_REF_NUMBER, item->planes);
+        } else if ((item->ref & UMB_REF_KIND) == UMB_REF_OCCLUDER) {
+            draw(w, item->ref & UMB_REF_NUMBER, item);
+        } else {
+            waits = visit_object(w, item, &entry);
         }
-        switch (item.ref & UMB_REF_KIND) {
-        case UMB_REF_NODE:
-            open_node(w, item.ref & UMB_REF_NUMBER, item.planes);
-            break;
-        case UMB_REF_OCCLUDER:
-            draw(w, item.ref & UMB_REF_NUMBER, &item);
-            break;
-        default:
-            visit_object(w, &item);
+        if (!waits) {
+            umb_heap_give(heap, entry.slot);
         }
     }
 }
@@ -387,7 +409,7 @@ umb_result umb_cull(umb_culler *c, const umb_view *view, umb_visible_set *out)
         (c->ops != NULL && c->ops->prepare(c->method, &w.map, w.scene) != UMB_OK)) {
         return umb_error_set(c->def.error, UMB_ERROR_MEMORY, "no memory for the frame");
     }
-    c->heap.count = 0;
+    umb_heap_clear(&c->heap);
     run(&w);
     umb_found_sort(c->found, c->count);
     for (uint32_t i = 0; i < c->count; ++i) {

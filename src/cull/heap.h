@@ -7,7 +7,6 @@
 #include "occlusion/method.h"
 
 typedef struct umb_waiting {
-    double key;      /* the view depth at which its turn comes */
     double nearest;  /* least view depth of its box: the key at first */
     double settled;  /* objects: the view depth beyond which nothing drawn can hide what keeps it visible */
     uint32_t ref;    /* index/tree.h */
@@ -19,9 +18,19 @@ typedef struct umb_waiting {
     bool drawn;      /* objects: seen once, its occluder is in the buffer; waits until it is settled */
 } umb_waiting;
 
+/* What the heap moves about: its order, and where the rest is. */
+typedef struct umb_heap_entry {
+    double key; /* the view depth at which its turn comes */
+    uint32_t ref;
+    uint32_t slot;
+} umb_heap_entry;
+
 typedef struct umb_heap {
-    umb_waiting *items;
-    size_t count, capacity;
+    umb_heap_entry *entries;
+    umb_waiting *slots;
+    uint32_t *free; /* slots to use again */
+    size_t count, free_count, used; /* used: slots ever handed out in this frame */
+    size_t entry_capacity, slot_capacity, free_capacity;
 } umb_heap;
 
 static inline uint32_t umb_waiting_rank(uint32_t ref)
@@ -30,7 +39,7 @@ static inline uint32_t umb_waiting_rank(uint32_t ref)
     return (0x18u >> (ref >> 29 & 6u)) & 3u;
 }
 
-static inline bool umb_waiting_before(const umb_waiting *a, const umb_waiting *b)
+static inline bool umb_heap_before(const umb_heap_entry *a, const umb_heap_entry *b)
 {
     if (a->key != b->key) {
         return a->key < b->key;
@@ -39,32 +48,29 @@ static inline bool umb_waiting_before(const umb_waiting *a, const umb_waiting *b
     return ra != rb ? ra < rb : a->ref < b->ref;
 }
 
-/* Room must have been reserved. */
-static inline void umb_heap_push(umb_heap *h, const umb_waiting *item)
+bool umb_heap_reserve(umb_heap *h, const umb_allocator *a, size_t count);
+void umb_heap_free(umb_heap *h, const umb_allocator *a);
+
+/* Forget everything. */
+static inline void umb_heap_clear(umb_heap *h)
 {
-    size_t i = h->count++;
-    while (i > 0 && umb_waiting_before(item, &h->items[(i - 1) / 2])) {
-        h->items[i] = h->items[(i - 1) / 2];
-        i = (i - 1) / 2;
-    }
-    h->items[i] = *item;
+    h->count = h->free_count = h->used = 0;
 }
 
-static inline umb_waiting umb_heap_pop(umb_heap *h)
+/* A slot to fill in and push. Room must have been reserved, here and below. */
+static inline uint32_t umb_heap_take(umb_heap *h)
 {
-    umb_waiting top = h->items[0];
-    umb_waiting last = h->items[--h->count];
-    size_t i = 0;
-    for (size_t child = 1; child < h->count; child = 2 * i + 1) {
-        child += child + 1 < h->count && umb_waiting_before(&h->items[child + 1], &h->items[child]);
-        if (!umb_waiting_before(&h->items[child], &last)) {
-            break;
-        }
-        h->items[i] = h->items[child];
-        i = child;
-    }
-    h->items[i] = last;
-    return top;
+    return h->free_count > 0 ? h->free[--h->free_count] : (uint32_t)h->used++;
 }
+
+/* Give a slot back. */
+static inline void umb_heap_give(umb_heap *h, uint32_t slot)
+{
+    h->free[h->free_count++] = slot;
+}
+
+void umb_heap_push(umb_heap *h, double key, uint32_t slot);
+/* Take the first entry out; its slot stays the caller's, to push again or give back. */
+umb_heap_entry umb_heap_pop(umb_heap *h);
 
 #endif

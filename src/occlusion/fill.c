@@ -72,7 +72,7 @@ static void cross(umb_fill *f, uint32_t row, double x, int32_t count)
     }
     uint32_t pixel = (uint32_t)column;
     f->crossings[(size_t)row * f->words * 32 + pixel] += count;
-    f->crossed[(size_t)row * f->words + pixel / 32] = 1;
+    f->crossed[(size_t)row * f->words + pixel / 32] |= 1u << (pixel % 32);
 }
 
 void umb_fill_edge(umb_fill *f, const umb_outline_edge *e)
@@ -113,22 +113,29 @@ void umb_fill_edge(umb_fill *f, const umb_outline_edge *e)
     }
 }
 
+/* Index of the lowest set bit. */
+static uint32_t lowest(uint32_t bits)
+{
+    return (uint32_t)__builtin_ctz(bits);
+}
+
 void umb_fill_row(umb_fill *f, uint32_t row, uint32_t *covered)
 {
     size_t base = (size_t)row * f->words;
     int32_t winding = 0;
     for (uint32_t w = f->word0; w <= f->word1; ++w) {
         uint32_t inside = winding > 0 ? ~0u : 0u;
-        if (f->crossed[base + w] != 0) {
-            int32_t *crossings = f->crossings + (base + w) * 32;
-            inside = 0;
-            for (uint32_t b = 0; b < 32; ++b) {
-                winding += crossings[b];
-                crossings[b] = 0;
-                inside |= (uint32_t)(winding > 0) << b;
-            }
-            f->crossed[base + w] = 0;
+        uint32_t crossed = f->crossed[base + w];
+        while (crossed != 0) {
+            uint32_t bit = lowest(crossed);
+            int32_t *change = &f->crossings[(base + w) * 32 + bit];
+            winding += *change;
+            *change = 0;
+            uint32_t from_here = ~0u << bit;
+            inside = winding > 0 ? inside | from_here : inside & ~from_here;
+            crossed &= crossed - 1;
         }
+        f->crossed[base + w] = 0;
         covered[w] = inside & ~f->touched[base + w];
         f->touched[base + w] = 0;
     }

@@ -19,7 +19,7 @@
 typedef struct umb_fill {
     uint32_t *touched; /* [row][word]: 32 pixels a word; all zero between fills */
     int32_t *crossings; /* [row][pixel]: change of the winding number from this pixel on; all zero likewise */
-    uint8_t *crossed;  /* [row][word]: the word has crossings */
+    uint32_t *crossed; /* [row][word]: which pixels of the word have crossings */
     size_t capacity;   /* words */
     uint32_t words;    /* a row */
     uint32_t row0, row1, word0, word1; /* the window, ends included */

@@ -89,6 +89,24 @@ static double side_slack(const umb_raster_map *m, int side, double reach)
     return 64.0 * UMB_U * (m->scale * reach + across * (m->orthographic ? 1.0 : reach));
 }
 
+/* True if all corners lie beyond one of the raster's borders. What lies beyond near is tested by its image
+ * instead, which is cheaper. */
+static bool corners_beside(const umb_raster_map *map, const umb_view_point corner[8], double reach, double slop)
+{
+    double across = map->scale + fabs(map->cx) + fabs(map->cy) + map->width + map->height;
+    for (int side = 2; side < SIDES; ++side) {
+        double most = -INFINITY;
+        for (int k = 0; k < 8; ++k) {
+            double g = side_value(map, side, &corner[k]);
+            most = g > most ? g : most;
+        }
+        if (most < -(side_slack(map, side, reach) + 3.0 * slop * across)) {
+            return true;
+        }
+    }
+    return false;
+}
+
 umb_depth_place umb_image_of_part(const umb_raster_map *map, const umb_aabb *part,
                                   const umb_transform *transform, bool identity, umb_image_bounds *out)
 {
@@ -103,19 +121,11 @@ umb_depth_place umb_image_of_part(const umb_raster_map *map, const umb_aabb *par
         out->w_max = corner[k].w + error > out->w_max ? corner[k].w + error : out->w_max;
         reach = corner[k].reach > reach ? corner[k].reach : reach;
     }
-    for (int side = 0; side < SIDES; ++side) {
-        double across = side < 2 ? 1.0 : map->scale + fabs(map->cx) + fabs(map->cy) + map->width + map->height;
-        double most = -INFINITY;
-        for (int k = 0; k < 8; ++k) {
-            double g = side_value(map, side, &corner[k]);
-            most = g > most ? g : most;
-        }
-        if (most < -(side_slack(map, side, reach) + 3.0 * slop * across)) {
-            return UMB_DEPTH_OUTSIDE;
-        }
+    if (out->w_max < map->near_depth || out->w_min > map->far_depth) {
+        return UMB_DEPTH_OUTSIDE;
     }
     if (!(out->w_min >= map->near_depth)) {
-        return UMB_DEPTH_CROSSING;
+        return corners_beside(map, corner, reach, slop) ? UMB_DEPTH_OUTSIDE : UMB_DEPTH_CROSSING;
     }
     out->x_min = out->y_min = INFINITY;
     out->x_max = out->y_max = -INFINITY;
@@ -153,21 +163,20 @@ static int cut_polygon(const umb_raster_map *map, int side, double slack, const 
 }
 
 /* Nearness of a triangle from its plane; when that is edge-on, from its nearest corner alone. */
-static void bound_nearness(const umb_raster_map *map, const float corner[3][3], double w_min,
-                           umb_outline *o)
+static void bound_nearness(const umb_raster_map *map, const float corner[3], const umb_face *face,
+                           double w_min, umb_outline *o)
 {
     double most = map->orthographic ? -w_min : 1.0 / w_min;
     o->most = most + 0x1p-22 * fabs(most);
     umb_plane_nearness plane = {0.0, 0.0, o->most, 0.0};
-    umb_face face = umb_face_of(map, corner[0], corner[1], corner[2]);
-    (void)umb_face_nearness(map, &face, corner[0], &plane);
+    (void)umb_face_nearness(map, face, corner, &plane);
     o->gx = plane.gx;
     o->gy = plane.gy;
     o->g0 = plane.g0 + plane.error;
 }
 
 umb_depth_place umb_outline_of_triangle(const umb_raster_map *map, const float corner[3][3],
-                                        umb_outline *outline, umb_image_bounds *out)
+                                        const umb_face *face, umb_outline *outline, umb_image_bounds *out)
 {
     umb_view_point polygon[2][3 + SIDES];
     double reach = 0.0;
@@ -208,6 +217,6 @@ umb_depth_place umb_outline_of_triangle(const umb_raster_map *map, const float c
         out->x_max = p.x + p.error > out->x_max ? p.x + p.error : out->x_max;
         out->y_max = p.y + p.error > out->y_max ? p.y + p.error : out->y_max;
     }
-    bound_nearness(map, corner, out->w_min, outline);
+    bound_nearness(map, corner[0], face, out->w_min, outline);
     return UMB_DEPTH_BEYOND;
 }

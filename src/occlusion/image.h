@@ -3,6 +3,7 @@
 #define UMB_IMAGE_H
 
 #include "method.h"
+#include "plane.h"
 
 /* Bounds of an image in raster coordinates and of its depth; outer, errors included. */
 typedef struct umb_image_bounds {
@@ -25,10 +26,10 @@ typedef enum umb_depth_place {
 umb_depth_place umb_image_of_part(const umb_raster_map *map, const umb_aabb *part,
                                   const umb_transform *transform, bool identity, umb_image_bounds *out);
 
-/* The outer image of what the view can see of a triangle of world vertices, as the polygon it is: it is
- * cut at the near and far depths and at the raster's borders first. CROSSING only where rounding leaves
+/* The outer image of what the view can see of a triangle of world vertices, as the polygon it is: face is
+ * the triangle's. It is cut at the near and far depths and at the raster's borders first. CROSSING only where rounding leaves
  * no image; the bounds are valid for BEYOND. */
 umb_depth_place umb_outline_of_triangle(const umb_raster_map *map, const float corner[3][3],
-                                        umb_outline *outline, umb_image_bounds *bounds);
+                                        const umb_face *face, umb_outline *outline, umb_image_bounds *bounds);
 
 #endif

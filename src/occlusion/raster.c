@@ -24,7 +24,7 @@ typedef struct raster {
     umb_fill fill;
     umb_silhouette silhouette;
     window_tile *window; /* one per tile of the buffer; masks all zero between draws */
-    uint8_t *wanted;     /* per tile: the occluder changes something */
+    uint8_t *wanted;     /* per tile: the sub-tiles that the occluder changes, a bit each */
     uint32_t *row;       /* one row of covered words */
     size_t window_capacity, wanted_capacity, row_capacity;
 } raster;
@@ -155,25 +155,33 @@ static void gather_tiles(raster *r, const window *w)
     }
 }
 
-/* A tile is wanted when the occluder covers pixels there that were open, or may cover closed ones from
- * nearer. Its depth starts as "nearest" and each triangle that may reach it lowers it. */
-static bool want_tile(const umb_tile *tile, const uint32_t mask[UMB_TILE_HEIGHT], double most)
+/* Which sub-tiles of a tile an occluder changes: it covers pixels there that were open, or may cover closed
+ * ones from nearer. Its pixels in the others are dropped. */
+static uint8_t want_tile(const umb_tile *tile, uint32_t mask[UMB_TILE_HEIGHT], double most)
 {
-    uint32_t bits = 0, fresh = 0;
+    uint32_t bits[2] = {0, 0}, fresh[2] = {0, 0}, keep[2] = {0, 0};
     for (uint32_t i = 0; i < UMB_TILE_HEIGHT; ++i) {
-        bits |= mask[i];
-        fresh |= mask[i] & ~tile->mask[i];
+        bits[i / 4] |= mask[i];
+        fresh[i / 4] |= mask[i] & ~tile->mask[i];
     }
-    if (fresh != 0 || bits == 0) {
-        return fresh != 0;
+    if ((bits[0] | bits[1]) == 0) {
+        return 0;
     }
-    float least = tile->z[0];
-    for (uint32_t s = 1; s < 8; ++s) {
-        least = tile->z[s] < least ? tile->z[s] : least;
+    uint8_t wanted = 0;
+    for (uint32_t s = 0; s < 8; ++s) {
+        uint32_t byte = 0xFFu << (8 * (s % 4));
+        if ((fresh[s / 4] & byte) != 0 || ((bits[s / 4] & byte) != 0 && most > tile->z[s])) {
+            wanted = (uint8_t)(wanted | 1u << s);
+            keep[s / 4] |= byte;
+        }
     }
-    return most > least;
+    for (uint32_t i = 0; i < UMB_TILE_HEIGHT; ++i) {
+        mask[i] &= keep[i / 4];
+    }
+    return wanted;
 }
 
+/* Depth of a wanted tile starts as "nearest"; each triangle that may reach it lowers it. */
 static bool want_tiles(raster *r, const window *w)
 {
     bool any = false;
@@ -181,13 +189,9 @@ static bool want_tiles(raster *r, const window *w)
         for (uint32_t tx = w->tx0; tx <= w->tx1; ++tx) {
             size_t t = (size_t)ty * r->coverage.columns + tx;
             window_tile *tile = &r->window[t];
-            bool wanted = want_tile(&r->coverage.tiles[t], tile->mask, r->silhouette.most);
-            r->wanted[t] = wanted;
-            any |= wanted;
-            if (!wanted) {
-                memset(tile->mask, 0, sizeof tile->mask);
-            }
-            for (uint32_t s = 0; s < 8; ++s) {
+            r->wanted[t] = want_tile(&r->coverage.tiles[t], tile->mask, r->silhouette.most);
+            any |= r->wanted[t] != 0;
+            for (uint32_t s = 0; s < 8 && r->wanted[t] != 0; ++s) {
                 tile->z[s] = INFINITY;
                 tile->held[s] = -INFINITY;
             }
@@ -239,20 +243,21 @@ static void sub_tile_range(double low, double high, double origin, double size, 
 
 /* All that touch a sub-tile bound its depth together, from the farthest; one that holds all of it does so
  * alone, however far the others are. */
-static void lower_tile(window_tile *tile, const umb_depth_triangle *t, uint32_t tx, uint32_t ty)
+static void lower_tile(window_tile *tile, uint8_t wanted, const umb_front_triangle *front,
+                       const umb_depth_triangle *t, uint32_t tx, uint32_t ty)
 {
     double x0 = tx * UMB_TILE_WIDTH, y0 = ty * UMB_TILE_HEIGHT;
     int i0, i1, j0, j1;
-    sub_tile_range(t->x_min, t->x_max, x0, 8.0, 4, &i0, &i1);
-    sub_tile_range(t->y_min, t->y_max, y0, 4.0, 2, &j0, &j1);
+    sub_tile_range(front->x_min, front->x_max, x0, 8.0, 4, &i0, &i1);
+    sub_tile_range(front->y_min, front->y_max, y0, 4.0, 2, &j0, &j1);
     for (int j = j0; j <= j1; ++j) {
         for (int i = i0; i <= i1; ++i) {
             double x = x0 + 8.0 * i, y = y0 + 4.0 * j;
-            overlap place = place_sub_tile(t, x, y);
+            int s = 4 * j + i;
+            overlap place = (wanted >> s & 1) != 0 ? place_sub_tile(t, x, y) : BESIDE;
             if (place == BESIDE) {
                 continue;
             }
-            int s = 4 * j + i;
             float z = farthest_in(t, x, y);
             tile->z[s] = z < tile->z[s] ? z : tile->z[s];
             tile->held[s] = place == HOLDS && z > tile->held[s] ? z : tile->held[s];
@@ -264,15 +269,22 @@ static void bound_depth(raster *r, const window *w)
 {
     const umb_silhouette *s = &r->silhouette;
     for (uint32_t i = 0; i < s->triangle_count; ++i) {
-        const umb_depth_triangle *t = &s->triangles[i];
-        window v = window_of(r, t->x_min, t->y_min, t->x_max, t->y_max);
+        const umb_front_triangle *front = &s->triangles[i];
+        window v = window_of(r, front->x_min, front->y_min, front->x_max, front->y_max);
         uint32_t tx1 = v.tx1 < w->tx1 ? v.tx1 : w->tx1, ty1 = v.ty1 < w->ty1 ? v.ty1 : w->ty1;
+        umb_depth_triangle t;
+        bool ready = false;
         for (uint32_t ty = v.ty0 > w->ty0 ? v.ty0 : w->ty0; ty <= ty1; ++ty) {
             for (uint32_t tx = v.tx0 > w->tx0 ? v.tx0 : w->tx0; tx <= tx1; ++tx) {
                 size_t tile = (size_t)ty * r->coverage.columns + tx;
-                if (r->wanted[tile] != 0) {
-                    lower_tile(&r->window[tile], t, tx, ty);
+                if (r->wanted[tile] == 0) {
+                    continue;
                 }
+                if (!ready) {
+                    umb_silhouette_depth(s, &r->map, front, &t);
+                    ready = true;
+                }
+                lower_tile(&r->window[tile], r->wanted[tile], front, &t, tx, ty);
             }
         }
     }

@@ -187,10 +187,30 @@ static void find_sides(umb_depth_triangle *t, const umb_raster_map *map, const u
     }
 }
 
+void umb_silhouette_depth(const umb_silhouette *s, const umb_raster_map *map, const umb_front_triangle *front,
+                          umb_depth_triangle *out)
+{
+    const uint32_t *corner = front->corner;
+    umb_plane_nearness plane = {0.0, 0.0, front->least, 0.0};
+    (void)umb_face_nearness(map, &front->face, s->world[corner[0]], &plane);
+    out->gx = plane.gx;
+    out->gy = plane.gy;
+    out->g0 = plane.g0 - plane.error;
+    out->least = front->least;
+    out->side_count = 0;
+    if (kept(s, corner[0]) && kept(s, corner[1]) && kept(s, corner[2])) {
+        const umb_raster_point *const p[3] = {&s->points[corner[0]], &s->points[corner[1]],
+                                              &s->points[corner[2]]};
+        find_sides(out, map, p);
+    }
+}
+
 static void add_triangle(umb_silhouette *s, const umb_raster_map *map, const umb_face *f,
                          const uint32_t corner[3], const box *image)
 {
-    umb_depth_triangle *t = &s->triangles[s->triangle_count++];
+    umb_front_triangle *t = &s->triangles[s->triangle_count++];
+    memcpy(t->corner, corner, sizeof t->corner);
+    t->face = *f;
     /* Corners that the cut takes away are nearer than those it leaves. */
     t->least = INFINITY;
     double most = -INFINITY;
@@ -204,17 +224,6 @@ static void add_triangle(umb_silhouette *s, const umb_raster_map *map, const umb
         }
     }
     s->most = most > s->most ? most : s->most;
-    umb_plane_nearness plane = {0.0, 0.0, t->least, 0.0};
-    (void)umb_face_nearness(map, f, s->world[corner[0]], &plane);
-    t->gx = plane.gx;
-    t->gy = plane.gy;
-    t->g0 = plane.g0 - plane.error;
-    t->side_count = 0;
-    if (kept(s, corner[0]) && kept(s, corner[1]) && kept(s, corner[2])) {
-        const umb_raster_point *const p[3] = {&s->points[corner[0]], &s->points[corner[1]],
-                                              &s->points[corner[2]]};
-        find_sides(t, map, p);
-    }
     t->x_min = float_down(image->x_min);
     t->y_min = float_down(image->y_min);
     t->x_max = float_up(image->x_max);

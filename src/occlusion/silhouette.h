@@ -9,6 +9,7 @@
 #ifndef UMB_SILHOUETTE_H
 #define UMB_SILHOUETTE_H
 
+#include "plane.h"
 #include "raster_map.h"
 #include "scene/scene.h"
 
@@ -19,22 +20,29 @@ typedef struct umb_outline_edge {
     int32_t multiplicity;
 } umb_outline_edge;
 
-/* A front triangle for depth: over the raster, nearness > max(gx x + gy y + g0, least) wherever the
- * triangle (cut at the near depth) projects, but for a relative
- * 2^-22 that the user of the plane takes off. */
+/* A front triangle, as the depth of what it covers needs it. */
+typedef struct umb_front_triangle {
+    uint32_t corner[3];
+    umb_face face;
+    double least;                     /* nearness of its farthest vertex, rounded away from the eye */
+    float x_min, y_min, x_max, y_max; /* box of its image in pixels, outer */
+} umb_front_triangle;
+
+/* A front triangle made ready for depth. */
 typedef struct umb_depth_triangle {
     /* Sides: ex x + ey y + e0 is below -margin only where the image of the triangle is not, for each side;
        above margin for all three only where it is. side_count 0: no use can be made of them. */
     double ex[3], ey[3], e0[3], margin[3];
     uint32_t side_count;
+    /* Over the raster, nearness > max(gx x + gy y + g0, least) wherever the triangle (cut at the near
+       depth) projects, but for a relative 2^-22 that the user of the plane takes off. */
     double gx, gy, g0;
-    double least;                   /* nearness of its farthest vertex, rounded away from the eye */
-    float x_min, y_min, x_max, y_max; /* box of its image in pixels, outer */
+    double least;
 } umb_depth_triangle;
 
 typedef struct umb_silhouette {
     umb_outline_edge *edges;
-    umb_depth_triangle *triangles;
+    umb_front_triangle *triangles;
     uint32_t edge_count, triangle_count;
     double x_min, y_min, x_max, y_max; /* box of the image, not clamped */
     double most; /* nearness of the nearest point that is kept, about */
@@ -54,5 +62,9 @@ void umb_silhouette_free(umb_silhouette *s, const umb_allocator *a);
 
 /* Find the silhouette of an occluder; false if nothing of it can cover a pixel. */
 bool umb_silhouette_find(umb_silhouette *s, const umb_raster_map *map, const umb_occluder *occluder);
+
+/* Make a front triangle of the silhouette found last ready for depth. */
+void umb_silhouette_depth(const umb_silhouette *s, const umb_raster_map *map, const umb_front_triangle *front,
+                          umb_depth_triangle *out);
 
 #endif
