@@ -2,7 +2,7 @@
 # `make` alone lists the targets.
 JOBS ?= $(shell nproc)
 BUILD := env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL cmake --build
-CTEST := ctest -j $(JOBS) --output-on-failure --no-tests=error --test-dir
+CTEST := ctest -j $(JOBS) --timeout 1800 --output-on-failure --no-tests=error --test-dir
 
 .PHONY: help deps build demo test asan check matrix bench soak fuzz format tidy clean
 

@@ -13,7 +13,7 @@ endif()
 
 function(umb_add_test name label)
   add_test(NAME ${name} COMMAND ${ARGN})
-  set_tests_properties(${name} PROPERTIES LABELS ${label} TIMEOUT 900
+  set_tests_properties(${name} PROPERTIES LABELS ${label}
                        ENVIRONMENT "${UMB_TEST_ENVIRONMENT}")
 endfunction()
 
@@ -42,6 +42,12 @@ if(TARGET umbrage-program)
     umb_add_test(cli_${name} cli ${CMAKE_SOURCE_DIR}/scripts/expect
                  ${CMAKE_SOURCE_DIR}/tests/cli/${name}.expected bash ${script})
   endforeach()
+endif()
+
+# The real scenes of UMBRAGE_SCENES, as much of them as UMBRAGE_TEST_SIZE says; uses all processors.
+if(TARGET umbrage-program)
+  umb_add_test(scenes scene ${CMAKE_SOURCE_DIR}/scripts/scenes)
+  set_tests_properties(scenes PROPERTIES PROCESSORS 64 SKIP_RETURN_CODE 77)
 endif()
 
 # examples/NAME.c is one program that needs nothing but the public headers; NAME.expected is what it
