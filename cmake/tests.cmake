@@ -21,7 +21,10 @@ endfunction()
 file(GLOB UMB_SUPPORT_SOURCES CONFIGURE_DEPENDS tests/support/*.c)
 add_library(umb_test_support STATIC ${UMB_SUPPORT_SOURCES})
 target_include_directories(umb_test_support PUBLIC tests PRIVATE src)
-target_link_libraries(umb_test_support PUBLIC ${UMB_INSIDE})
+target_link_libraries(umb_test_support PUBLIC ${UMB_INSIDE} PRIVATE PkgConfig::JANSSON m)
+
+# Tests of which one program is run in several parts, side by side.
+set(UMB_TEST_PARTS_test_scenes 2)
 
 # tests/test_NAME.c is one program. They may look inside src/ and tools/.
 file(GLOB UMB_TEST_SOURCES CONFIGURE_DEPENDS tests/test_*.c)
@@ -31,7 +34,14 @@ foreach(source ${UMB_TEST_SOURCES})
   target_include_directories(${name} PRIVATE src tools tests)
   target_link_libraries(${name} PRIVATE umb_test_support ${UMB_INSIDE} PkgConfig::CMOCKA
                         PkgConfig::JANSSON m)
-  umb_add_test(${name} unit ${name})
+  if(UMB_TEST_PARTS_${name})
+    math(EXPR last "${UMB_TEST_PARTS_${name}} - 1")
+    foreach(part RANGE ${last})
+      umb_add_test(${name}_${part} unit ${name} ${part} ${UMB_TEST_PARTS_${name}})
+    endforeach()
+  else()
+    umb_add_test(${name} unit ${name})
+  endif()
 endforeach()
 
 # tests/cli/NAME.sh is run with UMBRAGE_PROGRAM set; beside it NAME.expected is what it must print.

@@ -1,0 +1,206 @@
+/* Nothing that can be seen is hidden, on the real scenes of UMBRAGE_SCENES; and levels are really culled.
+ *
+ * test_scenes [PART PARTS]: takes every PARTS-th scene from PART on, so that parts run side by side. A third
+ * argument takes only the scenes whose name contains it. UMBRAGE_TEST_SIZE chooses the views. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "support/real_scenes.h"
+#include "support/strict.h"
+
+#define MAX_RASTERS 3
+
+/* How much is looked at. */
+typedef struct effort {
+    uint32_t walk_step, nasty_step, ortho_step; /* every so manyth row; nasty: of the nasty ones */
+    uint32_t rasters[MAX_RASTERS][2];
+    uint32_t raster_count;
+    truth_options oracle;
+} effort;
+
+static const effort SMALL = {
+    160, 5, 480, {{1024, 288}}, 1, {.grid_width = 192, .grid_height = 96, .guided_rays = 60000}};
+static const effort NORMAL = {
+    20, 1, 60, {{1024, 288}}, 1, {.grid_width = 384, .grid_height = 192, .guided_rays = 250000}};
+static const effort FULL = {1,  1,
+                            10, {{256, 144}, {1024, 288}, {2048, 576}},
+                            3,  {.grid_width = 384, .grid_height = 192, .guided_rays = 1000000}};
+
+static uint32_t part, parts = 1;
+static const char *only = "";
+
+/* One scene with everything that looks at it. */
+typedef struct stand {
+    const real_scene *scene;
+    const effort *effort;
+    model *model;
+    umb_scene *built;
+    umb_index *index;
+    umb_culler *cullers[MAX_RASTERS], *frustum;
+    truth *oracle;
+    camera_path path;
+    strict_count walk[MAX_RASTERS], nasty[MAX_RASTERS], ortho[MAX_RASTERS];
+} stand;
+
+static const effort *effort_wanted(effort *changed)
+{
+    const char *size = getenv("UMBRAGE_TEST_SIZE"), *step = getenv("UMBRAGE_SCENES_STEP");
+    *changed = size == NULL || size[0] == 'n' ? NORMAL : size[0] == 'f' ? FULL : SMALL;
+    if (step != NULL && atoi(step) > 0) {
+        changed->walk_step = (uint32_t)atoi(step);
+    }
+    return changed;
+}
+
+static void set_up(stand *s)
+{
+    umb_error error = {0};
+    s->model = model_load(s->scene->file, NULL, &error);
+    if (s->model == NULL || !camera_path_load(s->scene->path, &s->path, &error)) {
+        fail_msg("%s: %s", s->scene->file, error.text);
+    }
+    umb_tasks tasks = {0};
+    s->built = model_scene(s->model, true, tasks, NULL, &error);
+    assert_non_null(s->built);
+    s->oracle = truth_create(s->model, &error);
+    assert_non_null(s->oracle);
+    assert_int_equal(umb_index_create(s->built, NULL, &s->index), UMB_OK);
+    for (uint32_t r = 0; r < s->effort->raster_count; ++r) {
+        assert_int_equal(umb_culler_create(s->index, NULL, &s->cullers[r]), UMB_OK);
+    }
+    umb_culler_def none = {.method = UMB_METHOD_NONE};
+    assert_int_equal(umb_culler_create(s->index, &none, &s->frustum), UMB_OK);
+}
+
+static void tear_down(stand *s)
+{
+    camera_path_free(&s->path);
+    for (uint32_t r = 0; r < s->effort->raster_count; ++r) {
+        umb_culler_destroy(s->cullers[r]);
+    }
+    umb_culler_destroy(s->frustum);
+    umb_index_destroy(s->index);
+    umb_scene_destroy(s->built);
+    truth_destroy(s->oracle);
+    model_free(s->model);
+}
+
+static void check_row(stand *s, uint32_t row, bool ortho, strict_count *sums)
+{
+    umb_view view;
+    umb_visible_set seen;
+    assert_true(real_scene_view(s->scene, s->model, s->path.rows[row], ortho, &view));
+    assert_int_equal(umb_cull(s->frustum, &view, &seen), UMB_OK);
+    uint32_t in_frustum = seen.count;
+    strict_answer answers[MAX_RASTERS];
+    char labels[MAX_RASTERS][128];
+    for (uint32_t r = 0; r < s->effort->raster_count; ++r) {
+        const uint32_t *size = s->effort->rasters[r];
+        view.buffer_width = size[0];
+        view.buffer_height = size[1];
+        assert_int_equal(umb_cull(s->cullers[r], &view, &seen), UMB_OK);
+        (void)snprintf(labels[r], sizeof labels[r], "%s row %u%s at %ux%u", s->scene->name, row,
+                       ortho ? " parallel" : "", size[0], size[1]);
+        answers[r] = (strict_answer){seen.objects, seen.count, labels[r], &sums[r]};
+        sums[r].in_frustum += in_frustum;
+    }
+    assert_true(strict_check_all(s->oracle, s->model, &view, answers, s->effort->raster_count,
+                                 &s->effort->oracle));
+}
+
+static double mean(uint64_t sum, uint64_t count)
+{
+    return count != 0 ? (double)sum / (double)count : 0.0;
+}
+
+static void say(const stand *s, uint32_t raster, const char *views, const strict_count *c)
+{
+    const uint32_t *size = s->effort->rasters[raster];
+    printf("# %-26s %4ux%-3u %-8s views %3llu in frustum %7.1f reported %6.1f truly visible %6.1f "
+           "wrong %llu "
+           "unconfirmed %llu conservativity %.3f\n",
+           s->scene->name, size[0], size[1], views, (unsigned long long)c->views,
+           mean(c->in_frustum, c->views), mean(c->reported, c->views),
+           mean(c->truth_visible, c->views), (unsigned long long)c->wrongly_hidden,
+           (unsigned long long)c->unconfirmed, mean(c->reported, c->truth_visible));
+    (void)fflush(stdout);
+}
+
+/* Returns how many objects were wrongly hidden, plus one for each level that is not really culled. */
+static uint64_t check_scene(const real_scene *scene, const effort *e)
+{
+    stand s = {.scene = scene, .effort = e};
+    set_up(&s);
+    for (uint32_t row = 0; row < s.path.count; ++row) {
+        if (row < scene->nasty_from && row % e->walk_step == 0) {
+            check_row(&s, row, false, s.walk);
+        }
+        if (row >= scene->nasty_from && (row - scene->nasty_from) % e->nasty_step == 0) {
+            check_row(&s, row, false, s.nasty);
+        }
+        if (row % e->ortho_step == 0) {
+            check_row(&s, row, true, s.ortho);
+        }
+    }
+    uint64_t bad = 0;
+    for (uint32_t r = 0; r < e->raster_count; ++r) {
+        const strict_count *w = &s.walk[r];
+        say(&s, r, "walked", w);
+        say(&s, r, "nasty", &s.nasty[r]);
+        say(&s, r, "parallel", &s.ortho[r]);
+        bad += w->wrongly_hidden + s.nasty[r].wrongly_hidden + s.ortho[r].wrongly_hidden;
+        bool counted = scene->level && e->rasters[r][0] >= 1024 && w->views >= 20;
+        if (counted && (w->reported > 3 * w->truth_visible || 2 * w->reported > w->in_frustum)) {
+            printf(
+                "# %s: reported more than three times what is seen, or than half of the frustum\n",
+                scene->name);
+            ++bad;
+        }
+    }
+    tear_down(&s);
+    return bad;
+}
+
+static void test_real_scenes(void **state)
+{
+    (void)state;
+    const char *folder = getenv("UMBRAGE_SCENES");
+    if (folder == NULL || folder[0] == '\0') {
+        print_message("skipped: UMBRAGE_SCENES names no folder of real scenes\n");
+        skip();
+    }
+    real_scenes all;
+    umb_error error = {0};
+    effort e;
+    (void)effort_wanted(&e);
+    if (!real_scenes_find(folder, &all, &error)) {
+        fail_msg("%s", error.text);
+    }
+    assert_true(all.count > 0);
+    uint64_t bad = 0;
+    for (uint32_t i = 0; i < all.count; ++i) {
+        if (i % parts == part && strstr(all.scenes[i].name, only) != NULL) {
+            bad += check_scene(&all.scenes[i], &e);
+        }
+    }
+    real_scenes_free(&all);
+    assert_int_equal(bad, 0);
+}
+
+int main(int argc, char **argv)
+{
+    if (argc > 2) {
+        part = (uint32_t)atoi(argv[1]);
+        parts = atoi(argv[2]) > 0 ? (uint32_t)atoi(argv[2]) : 1;
+    }
+    if (argc > 3) {
+        only = argv[3];
+    }
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_real_scenes)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
