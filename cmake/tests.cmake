@@ -54,12 +54,6 @@ if(TARGET umbrage-program)
   endforeach()
 endif()
 
-# The real scenes of UMBRAGE_SCENES, as much of them as UMBRAGE_TEST_SIZE says; uses all processors.
-if(TARGET umbrage-program)
-  umb_add_test(scenes scene ${CMAKE_SOURCE_DIR}/scripts/scenes)
-  set_tests_properties(scenes PROPERTIES PROCESSORS 64 SKIP_RETURN_CODE 77)
-endif()
-
 # examples/NAME.c is one program that needs nothing but the public headers; NAME.expected is what it
 # must print.
 file(GLOB UMB_EXAMPLES CONFIGURE_DEPENDS examples/*.c)
