@@ -128,9 +128,10 @@ static bool outline_span(const umb_outline *o, uint32_t row, uint32_t width, uin
     if (!(high >= 0.0 && low <= width)) {
         return false;
     }
-    double from = floor(low), to = ceil(high) - 1.0;
-    from = from < 0.0 ? 0.0 : from > width - 1.0 ? width - 1.0 : from;
-    to = to < from ? from : to > width - 1.0 ? width - 1.0 : to;
+    int32_t end = (int32_t)width - 1;
+    int32_t from = umb_pixel_floor(low - UMB_PIXEL_SLACK), to = umb_pixel_floor(high + UMB_PIXEL_SLACK);
+    from = from < 0 ? 0 : from > end ? end : from;
+    to = to < from ? from : to > end ? end : to;
     *first = (uint32_t)from;
     *last = (uint32_t)to;
     return true;

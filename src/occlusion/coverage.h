@@ -16,6 +16,7 @@
 #define UMB_COVERAGE_H
 
 #include "base/memory.h"
+#include "pixel.h"
 
 #define UMB_TILE_WIDTH 32
 #define UMB_TILE_HEIGHT 8

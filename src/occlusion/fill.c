@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "pixel.h"
 
 bool umb_fill_resize(umb_fill *f, const umb_allocator *a, uint32_t width, uint32_t height)
 {
@@ -41,75 +42,118 @@ void umb_fill_begin(umb_fill *f, uint32_t x0, uint32_t y0, uint32_t x1, uint32_t
     f->word1 = x1 / 32;
 }
 
+static int32_t clamp_int(int32_t v, int32_t low, int32_t high)
+{
+    return v < low ? low : v > high ? high : v;
+}
+
 static double clamp(double v, double low, double high)
 {
     return v < low ? low : v > high ? high : v;
 }
 
-/* Mark pixels first..last (window columns) of a row. */
-static void touch(umb_fill *f, uint32_t row, uint32_t first, uint32_t last)
+/* Mark the pixels of a row whose closed squares meet [low, high]. */
+static void touch(umb_fill *f, uint32_t row, double low, double high)
 {
-    uint32_t *words = f->touched + (size_t)row * f->words;
-    uint32_t w0 = first / 32, w1 = last / 32;
-    uint32_t low = ~0u << (first % 32), high = ~0u >> (31 - last % 32);
-    if (w0 == w1) {
-        words[w0] |= low & high;
+    int32_t first = 32 * (int32_t)f->word0, last = 32 * (int32_t)f->word1 + 31;
+    int32_t c0 = umb_pixel_floor(low - UMB_PIXEL_SLACK), c1 = umb_pixel_floor(high + UMB_PIXEL_SLACK);
+    if (c0 > last || c1 < first) {
         return;
     }
-    words[w0] |= low;
+    uint32_t from = (uint32_t)clamp_int(c0, first, last), to = (uint32_t)clamp_int(c1, first, last);
+    uint32_t *words = f->touched + (size_t)row * f->words;
+    uint32_t w0 = from / 32, w1 = to / 32;
+    uint32_t left = ~0u << (from % 32), right = ~0u >> (31 - to % 32);
+    if (w0 == w1) {
+        words[w0] |= left & right;
+        return;
+    }
+    words[w0] |= left;
     for (uint32_t w = w0 + 1; w < w1; ++w) {
         words[w] = ~0u;
     }
-    words[w1] |= high;
+    words[w1] |= right;
 }
 
 static void cross(umb_fill *f, uint32_t row, double x, int32_t count)
 {
-    double first = 32.0 * f->word0, end = 32.0 * (f->word1 + 1);
-    double column = floor(clamp(x, first - 1.0, end)) + 1.0;
+    int32_t first = 32 * (int32_t)f->word0, end = 32 * (int32_t)(f->word1 + 1);
+    int32_t column = umb_pixel_floor(x) + 1;
     if (column >= end) {
         return;
     }
-    uint32_t pixel = (uint32_t)column;
+    uint32_t pixel = (uint32_t)(column < first ? first : column);
     f->crossings[(size_t)row * f->words * 32 + pixel] += count;
     f->crossed[(size_t)row * f->words + pixel / 32] |= 1u << (pixel % 32);
 }
 
-void umb_fill_edge(umb_fill *f, const umb_outline_edge *e)
+/* An edge from top to bottom. */
+typedef struct steep_edge {
+    double x_top, x_low, y_min, y_max;
+    double x_min, x_max;
+    double slope, error;
+    int32_t count; /* crossing it from left to right changes the winding number by this */
+    bool flat;     /* its slope means nothing: a row takes all of it */
+} steep_edge;
+
+static steep_edge order_edge(const umb_outline_edge *e)
 {
     bool down = e->y1 > e->y0;
-    double y_min = down ? e->y0 : e->y1, y_max = down ? e->y1 : e->y0;
-    double x_top = down ? e->x0 : e->x1, x_low = down ? e->x1 : e->x0;
-    double x_min = x_top < x_low ? x_top : x_low, x_max = x_top < x_low ? x_low : x_top;
-    int32_t count = down ? e->multiplicity : -e->multiplicity;
+    steep_edge s;
+    s.y_min = down ? e->y0 : e->y1;
+    s.y_max = down ? e->y1 : e->y0;
+    s.x_top = down ? e->x0 : e->x1;
+    s.x_low = down ? e->x1 : e->x0;
+    s.x_min = s.x_top < s.x_low ? s.x_top : s.x_low;
+    s.x_max = s.x_top < s.x_low ? s.x_low : s.x_top;
+    s.count = down ? e->multiplicity : -e->multiplicity;
+    /* Interpolating x is off by less than 16 units of the two ends. */
+    s.error = e->error + 16.0 * UMB_U * (fabs(s.x_top) + fabs(s.x_low));
+    double dy = s.y_max - s.y_min;
+    s.flat = dy <= 1e-12 * (s.x_max - s.x_min) || dy < 1e-200;
+    s.slope = s.flat ? 0.0 : (s.x_low - s.x_top) / dy;
+    return s;
+}
 
-    /* Interpolating x is off by less than 8 units of the two ends. Where the edge is so flat that its
-       slope means nothing, a row takes all of it. */
-    double error = e->error + 16.0 * UMB_U * (fabs(x_top) + fabs(x_low));
-    double dy = y_max - y_min;
-    bool flat = dy <= 1e-12 * (x_max - x_min) || dy < 1e-200;
-    double slope = flat ? 0.0 : (x_low - x_top) / dy;
+/* A row that an end of the edge may lie in. */
+static void end_row(umb_fill *f, const steep_edge *s, uint32_t r)
+{
+    double low = s->x_min, high = s->x_max;
+    if (!s->flat) {
+        double ya = clamp(r - s->error, s->y_min, s->y_max), yb = clamp(r + 1 + s->error, s->y_min, s->y_max);
+        double xa = s->x_top + (ya - s->y_min) * s->slope, xb = s->x_top + (yb - s->y_min) * s->slope;
+        low = clamp(xa < xb ? xa : xb, s->x_min, s->x_max);
+        high = clamp(xa < xb ? xb : xa, s->x_min, s->x_max);
+    }
+    touch(f, r, low - s->error, high + s->error);
+    double centre = r + 0.5;
+    if (s->y_min <= centre && centre < s->y_max) {
+        cross(f, r, clamp(s->x_top + (centre - s->y_min) * s->slope, s->x_min, s->x_max), s->count);
+    }
+}
 
-    double row_low = ceil(y_min - error) - 1.0, row_high = floor(y_max + error);
-    if (!(row_low <= f->row1 && row_high >= f->row0)) {
+void umb_fill_edge(umb_fill *f, const umb_outline_edge *e)
+{
+    steep_edge s = order_edge(e);
+    int32_t row0 = (int32_t)f->row0, row1 = (int32_t)f->row1;
+    int32_t r0 = umb_pixel_floor(s.y_min - s.error - UMB_PIXEL_SLACK);
+    int32_t r1 = umb_pixel_floor(s.y_max + s.error + UMB_PIXEL_SLACK);
+    if (r0 > row1 || r1 < row0) {
         return;
     }
-    uint32_t r0 = (uint32_t)clamp(row_low, f->row0, f->row1);
-    uint32_t r1 = (uint32_t)clamp(row_high, f->row0, f->row1);
-    double first = 32.0 * f->word0, last = 32.0 * f->word1 + 31.0;
-    for (uint32_t r = r0; r <= r1; ++r) {
-        double ya = clamp(r - error, y_min, y_max), yb = clamp(r + 1 + error, y_min, y_max);
-        double xa = x_top + (ya - y_min) * slope, xb = x_top + (yb - y_min) * slope;
-        double low = clamp(flat ? x_min : xa < xb ? xa : xb, x_min, x_max) - error;
-        double high = clamp(flat ? x_max : xa < xb ? xb : xa, x_min, x_max) + error;
-        double c0 = ceil(low) - 1.0, c1 = floor(high);
-        if (c0 <= last && c1 >= first) {
-            touch(f, r, (uint32_t)clamp(c0, first, last), (uint32_t)clamp(c1, first, last));
+    uint32_t first = (uint32_t)(r0 < row0 ? row0 : r0), last = (uint32_t)(r1 > row1 ? row1 : r1);
+    /* Rows that lie wholly between the ends, grown by the error, need no cutting at the ends:
+     *   x over [r - error, r + 1 + error] runs from x(r) - |slope| error to x(r) + slope + |slope| error. */
+    double grown = fabs(s.slope) * s.error + s.error;
+    double left = (s.slope < 0.0 ? s.slope : 0.0) - grown, right = (s.slope > 0.0 ? s.slope : 0.0) + grown;
+    for (uint32_t r = first; r <= last; ++r) {
+        if (s.flat || r - s.error < s.y_min || r + 1 + s.error > s.y_max) {
+            end_row(f, &s, r);
+            continue;
         }
-        double centre = r + 0.5;
-        if (y_min <= centre && centre < y_max) {
-            cross(f, r, clamp(x_top + (centre - y_min) * slope, x_min, x_max), count);
-        }
+        double x = s.x_top + (r - s.y_min) * s.slope;
+        touch(f, r, x + left, x + right);
+        cross(f, r, x + 0.5 * s.slope, s.count);
     }
 }
 

@@ -9,11 +9,11 @@ umb_image umb_image_of_bounds(const umb_raster_map *map, const umb_image_bounds 
     if (!(b->x_max >= 0.0 && b->y_max >= 0.0 && b->x_min <= map->width && b->y_min <= map->height)) {
         return image;
     }
-    double x_last = map->width - 1.0, y_last = map->height - 1.0;
-    double x0 = floor(b->x_min), x1 = ceil(b->x_max) - 1.0;
-    double y0 = floor(b->y_min), y1 = ceil(b->y_max) - 1.0;
-    x0 = x0 < 0.0 ? 0.0 : x0 > x_last ? x_last : x0;
-    y0 = y0 < 0.0 ? 0.0 : y0 > y_last ? y_last : y0;
+    int32_t x_last = (int32_t)map->width - 1, y_last = (int32_t)map->height - 1;
+    int32_t x0 = umb_pixel_floor(b->x_min - UMB_PIXEL_SLACK), x1 = umb_pixel_floor(b->x_max + UMB_PIXEL_SLACK);
+    int32_t y0 = umb_pixel_floor(b->y_min - UMB_PIXEL_SLACK), y1 = umb_pixel_floor(b->y_max + UMB_PIXEL_SLACK);
+    x0 = x0 < 0 ? 0 : x0 > x_last ? x_last : x0;
+    y0 = y0 < 0 ? 0 : y0 > y_last ? y_last : y0;
     x1 = x1 < x0 ? x0 : x1 > x_last ? x_last : x1;
     y1 = y1 < y0 ? y0 : y1 > y_last ? y_last : y1;
     image.rect.x0 = (int16_t)x0;

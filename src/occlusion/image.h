@@ -11,8 +11,7 @@ typedef struct umb_image_bounds {
     double w_min, w_max;
 } umb_image_bounds;
 
-/* Pixels whose closed squares cover those bounds as far as they are on the raster. A point on a pixel's
- * border needs only one of the pixels that it touches. */
+/* Pixels whose closed squares cover those bounds as far as they are on the raster. */
 umb_image umb_image_of_bounds(const umb_raster_map *map, const umb_image_bounds *b);
 
 typedef enum umb_depth_place {
