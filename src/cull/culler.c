@@ -16,10 +16,10 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "detail.h"
+#include "found.h"
 #include "frustum/box_kernels.h"
 #include "frustum/frustum.h"
-#include "geometry/transform.h"
-#include "found.h"
 #include "heap.h"
 #include "index/tree.h"
 #include "occlusion/image.h"
@@ -128,17 +128,13 @@ static bool reserve(umb_culler *c, const umb_tree *tree, const umb_committed *sc
     return true;
 }
 
-static bool hidden(walk *w, uint32_t ref, const umb_image *image, const umb_outline *outline)
+static bool hidden(walk *w, uint32_t ref, const umb_image *image)
 {
-    const umb_culler *c = w->culler;
-    if (c->ops == NULL) {
+    if (w->culler->ops == NULL) {
         return false;
     }
-    umb_query query = {*image, outline, ref};
-    umb_verdict verdict;
-    c->ops->submit(c->method, &query, 1, &verdict);
-    w->stats.queries += 1;
-    return verdict == UMB_VERDICT_HIDDEN;
+    umb_asker asker = {w->culler->ops, w->culler->method, &w->map, &w->stats};
+    return umb_detail_hidden(&asker, ref, image, NULL);
 }
 
 static void count_hidden(walk *w, uint32_t ref)
@@ -177,7 +173,7 @@ static void consider(walk *w, const umb_node *node, const umb_projected *p, uint
             return;
         }
         item.image = umb_image_of_bounds(&w->map, &b);
-        if (hidden(w, item.ref, &item.image, NULL)) {
+        if (hidden(w, item.ref, &item.image)) {
             count_hidden(w, item.ref);
             return;
         }
@@ -223,89 +219,6 @@ static void draw(walk *w, uint32_t occluder, const umb_waiting *item)
     w->drawn += c->ops->occlude(c->method, occluder, &w->stats);
 }
 
-/* True if the object is its shape, so that its parts and triangles say more than its box. */
-static bool refinable(const walk *w, const umb_object *o)
-{
-    return o->refine && w->culler->ops != NULL && o->mesh->seen_count > 0;
-}
-
-/* True if a triangle of a leaf may be seen; *settled becomes the greatest view depth in view of the first
- * that may. Those that face the eye are asked first: one of them shows most visible things. */
-static bool triangles_show(walk *w, const umb_object *o, uint32_t ref, const umb_part *part, double *settled)
-{
-    const umb_mesh *mesh = o->mesh;
-    for (int away = 0; away < 2; ++away) {
-        for (uint32_t i = part->begin; i < part->end; ++i) {
-            const uint32_t *corner = mesh->triangles[mesh->part_order[i]];
-            float world[3][3];
-            for (int k = 0; k < 3; ++k) {
-                if (o->identity) {
-                    memcpy(world[k], mesh->positions[corner[k]], sizeof world[k]);
-                } else {
-                    umb_transform_point(&o->transform, mesh->positions[corner[k]], world[k]);
-                }
-            }
-            umb_face face = umb_face_of(&w->map, world[0], world[1], world[2]);
-            if ((face.distance > 0.0) == (away != 0)) {
-                continue;
-            }
-            umb_image_bounds b;
-            umb_outline outline;
-            umb_depth_place place =
-                umb_outline_of_triangle(&w->map, (const float(*)[3])world, &face, &outline, &b);
-            if (place == UMB_DEPTH_OUTSIDE) {
-                continue;
-            }
-            *settled = place == UMB_DEPTH_BEYOND ? b.w_max : -INFINITY;
-            umb_image image = umb_image_of_bounds(&w->map, &b);
-            if (place == UMB_DEPTH_CROSSING || !hidden(w, ref, &image, &outline)) {
-                return true;
-            }
-        }
-    }
-    return false;
-}
-
-/* True if a part may be seen, as far as its box tells. The first box of an object that is not turned is
- * its bounds, which have been asked about just now. */
-static bool part_shows(walk *w, const umb_object *o, const umb_waiting *item)
-{
-    if (item->part == 0 && o->identity) {
-        return true;
-    }
-    umb_image_bounds b;
-    switch (umb_image_of_part(&w->map, &o->mesh->parts[item->part].box, &o->transform, o->identity, &b)) {
-    case UMB_DEPTH_OUTSIDE:
-        return false;
-    case UMB_DEPTH_CROSSING:
-        return true;
-    default: {
-        umb_image image = umb_image_of_bounds(&w->map, &b);
-        return !hidden(w, item->ref, &image, NULL);
-    }
-    }
-}
-
-/* Walk the parts from item->part on to the first that may be seen, and stay there: parts passed over are
- * hidden and remain so. False if all are. */
-static bool parts_show(walk *w, const umb_object *o, umb_waiting *item)
-{
-    const umb_mesh *mesh = o->mesh;
-    while (item->part < mesh->part_count) {
-        const umb_part *part = &mesh->parts[item->part];
-        bool leaf = part->skip == item->part + 1;
-        bool shows = part_shows(w, o, item);
-        if (shows && leaf) {
-            shows = triangles_show(w, o, item->ref, part, &item->settled);
-            if (shows) {
-                return true;
-            }
-        }
-        item->part = shows ? item->part + 1 : part->skip;
-    }
-    return false;
-}
-
 static void report(walk *w, const umb_waiting *item)
 {
     umb_culler *c = w->culler;
@@ -322,9 +235,12 @@ static bool visit_object(walk *w, umb_waiting *item, const umb_heap_entry *entry
 {
     const umb_object *o = &w->scene->objects[item->ref & UMB_REF_NUMBER];
     bool fresh = !(item->drawn && item->stamp == w->drawn);
-    if (fresh && refinable(w, o) && !parts_show(w, o, item)) {
-        w->stats.hidden_objects += 1;
-        return false;
+    if (fresh && w->culler->ops != NULL && o->refine && o->mesh->seen_count > 0) {
+        umb_asker asker = {w->culler->ops, w->culler->method, &w->map, &w->stats};
+        if (!umb_detail_shows(&asker, o, item->ref, &item->part, &item->settled)) {
+            w->stats.hidden_objects += 1;
+            return false;
+        }
     }
     if (!item->drawn) {
         draw(w, o->occluder, item);
@@ -350,7 +266,7 @@ static void run(walk *w)
         umb_heap_entry entry = umb_heap_pop(heap);
         umb_waiting *item = &heap->slots[entry.slot];
         bool waits = false;
-        if (item->testable && item->stamp != w->drawn && hidden(w, item->ref, &item->image, NULL)) {
+        if (item->testable && item->stamp != w->drawn && hidden(w, item->ref, &item->image)) {
             count_hidden(w, item->ref);
         } else if ((item->ref & UMB_REF_KIND) == UMB_REF_NODE) {
             open_node(w, item->ref & UMB_REF_NUMBER, item->planes);

@@ -2,36 +2,7 @@
 
 #include <math.h>
 
-/* A sum of a and b without loss: *high is the rounded sum, *low what rounding took (Knuth's two-sum,
- * right for all doubles that do not overflow; ours stay below 2^260). */
-static void two_sum(double a, double b, double *high, double *low)
-{
-    double s = a + b;
-    double bb = s - a;
-    *low = (a - (s - bb)) + (b - bb);
-    *high = s;
-}
-
-/* The sign of an exact sum of six doubles: terms are added one by one to an expansion whose parts do
- * not overlap and grow in size (Shewchuk's grow-expansion); the last non-zero part has the sign of the
- * whole. */
-static int sign_of_sum(const double terms[6])
-{
-    double parts[6];
-    for (int n = 0; n < 6; ++n) {
-        double carry = terms[n];
-        for (int k = 0; k < n; ++k) {
-            two_sum(carry, parts[k], &carry, &parts[k]);
-        }
-        parts[n] = carry;
-    }
-    for (int k = 5; k >= 0; --k) {
-        if (parts[k] != 0.0) {
-            return parts[k] > 0.0 ? 1 : -1;
-        }
-    }
-    return 0;
-}
+#include "expansion.h"
 
 int umb_collinear_turn(const float a[3], const float b[3], const float c[3], int i, int j)
 {
@@ -49,7 +20,7 @@ int umb_collinear_turn(const float a[3], const float b[3], const float c[3], int
     if (fabs(sum) > size * 0x1p-50) {
         return sum > 0.0 ? 1 : -1;
     }
-    return size == 0.0 ? 0 : sign_of_sum(terms);
+    return size == 0.0 ? 0 : umb_sign_of_sum(terms, 6);
 }
 
 bool umb_collinear(const float a[3], const float b[3], const float c[3])

@@ -1,0 +1,100 @@
+#include "detail.h"
+
+#include <string.h>
+
+#include "geometry/transform.h"
+
+bool umb_detail_hidden(const umb_asker *a, uint32_t ref, const umb_image *image, const umb_outline *outline)
+{
+    umb_query query = {*image, outline, ref};
+    umb_verdict verdict;
+    a->ops->submit(a->method, &query, 1, &verdict);
+    a->stats->queries += 1;
+    return verdict == UMB_VERDICT_HIDDEN;
+}
+
+static void place_triangle(const umb_object *o, const uint32_t corner[3], float world[3][3])
+{
+    for (int k = 0; k < 3; ++k) {
+        const float *p = o->mesh->positions[corner[k]];
+        if (o->identity) {
+            memcpy(world[k], p, sizeof world[k]);
+        } else {
+            umb_transform_point(&o->transform, p, world[k]);
+        }
+    }
+}
+
+static bool triangle_shows(const umb_asker *a, uint32_t ref, const float world[3][3], const umb_face *face,
+                           double *settled)
+{
+    umb_image_bounds b;
+    umb_outline outline;
+    switch (umb_outline_of_triangle(a->map, world, face, &outline, &b)) {
+    case UMB_DEPTH_OUTSIDE:
+        return false;
+    case UMB_DEPTH_CROSSING:
+        *settled = -INFINITY;
+        return true;
+    default: {
+        *settled = b.w_max;
+        umb_image image = umb_image_of_bounds(a->map, &b);
+        return !umb_detail_hidden(a, ref, &image, &outline);
+    }
+    }
+}
+
+/* Triangles that face the eye are asked first: one of them shows most visible things. */
+static bool leaf_shows(const umb_asker *a, const umb_object *o, uint32_t ref, const umb_part *part,
+                       double *settled)
+{
+    const umb_mesh *mesh = o->mesh;
+    for (int away = 0; away < 2; ++away) {
+        for (uint32_t i = part->begin; i < part->end; ++i) {
+            float world[3][3];
+            place_triangle(o, mesh->triangles[mesh->part_order[i]], world);
+            umb_face face = umb_face_of(a->map, world[0], world[1], world[2]);
+            if ((face.distance > 0.0) == (away == 0) &&
+                triangle_shows(a, ref, (const float(*)[3])world, &face, settled)) {
+                return true;
+            }
+        }
+    }
+    return false;
+}
+
+static bool box_shows(const umb_asker *a, const umb_object *o, uint32_t ref, uint32_t part)
+{
+    if (part == 0 && o->identity) {
+        return true; /* the object's bounds */
+    }
+    umb_image_bounds b;
+    switch (umb_image_of_part(a->map, &o->mesh->parts[part].box, &o->transform, o->identity, &b)) {
+    case UMB_DEPTH_OUTSIDE:
+        return false;
+    case UMB_DEPTH_CROSSING:
+        return true;
+    default: {
+        umb_image image = umb_image_of_bounds(a->map, &b);
+        return !umb_detail_hidden(a, ref, &image, NULL);
+    }
+    }
+}
+
+bool umb_detail_shows(const umb_asker *a, const umb_object *o, uint32_t ref, uint32_t *part, double *settled)
+{
+    const umb_mesh *mesh = o->mesh;
+    while (*part < mesh->part_count) {
+        const umb_part *p = &mesh->parts[*part];
+        bool leaf = p->skip == *part + 1;
+        bool shows = box_shows(a, o, ref, *part);
+        if (shows && leaf) {
+            shows = leaf_shows(a, o, ref, p, settled);
+            if (shows) {
+                return true;
+            }
+        }
+        *part = shows ? *part + 1 : p->skip;
+    }
+    return false;
+}
