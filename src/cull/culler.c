@@ -228,25 +228,38 @@ static void report(walk *w, const umb_waiting *item)
     f->inside = item->planes == 0;
 }
 
-/* An object whose turn has come. If something of it may be seen it becomes an occluder at once, but it is
- * reported only when everything nearer than the far end of what may be seen has been drawn: until then it
- * waits again, and may yet turn out to be hidden. True if it waits. */
+/* True if the object may be seen, asked in detail when its shape is all that is drawn. */
+static bool object_shows(walk *w, const umb_object *o, umb_waiting *item)
+{
+    if (w->culler->ops == NULL || !o->refine || o->mesh->seen_count == 0) {
+        return true;
+    }
+    umb_asker asker = {w->culler->ops, w->culler->method, &w->map, &w->stats};
+    return umb_detail_shows(&asker, o, item->ref, &item->part, &item->settled);
+}
+
+/* An object whose turn has come. It is reported only when everything that can hide it has been drawn: until
+ * then it waits again, for the depth of its far end, and may yet turn out to be hidden. One that hides by
+ * its own shape is asked about at once, too, because it is to be drawn before what is behind it; its wait
+ * then ends where what may be seen of it ends. True if it waits. */
 static bool visit_object(walk *w, umb_waiting *item, const umb_heap_entry *entry)
 {
     const umb_object *o = &w->scene->objects[item->ref & UMB_REF_NUMBER];
-    bool fresh = !(item->drawn && item->stamp == w->drawn);
-    if (fresh && w->culler->ops != NULL && o->refine && o->mesh->seen_count > 0) {
-        umb_asker asker = {w->culler->ops, w->culler->method, &w->map, &w->stats};
-        if (!umb_detail_shows(&asker, o, item->ref, &item->part, &item->settled)) {
+    bool first = !item->waited, hides = o->occluder != UMB_NONE;
+    item->waited = true;
+    bool ask = first ? hides : !hides || item->stamp != w->drawn;
+    if (w->culler->ops != NULL && ask && !object_shows(w, o, item)) {
+        w->stats.hidden_objects += 1;
+        return false;
+    }
+    if (first) {
+        draw(w, o->occluder, item);
+    }
+    if (w->culler->ops == NULL || !(item->settled > entry->key)) {
+        if (first && !hides && !object_shows(w, o, item)) {
             w->stats.hidden_objects += 1;
             return false;
         }
-    }
-    if (!item->drawn) {
-        draw(w, o->occluder, item);
-        item->drawn = true;
-    }
-    if (w->culler->ops == NULL || !(item->settled > entry->key)) {
         report(w, item);
         return false;
     }

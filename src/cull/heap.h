@@ -15,7 +15,7 @@ typedef struct umb_waiting {
     uint32_t part;   /* objects: parts before this one are hidden */
     uint16_t planes; /* frustum planes that its box may cross */
     bool testable;   /* beyond the near depth everywhere */
-    bool drawn;      /* objects: seen once, its occluder is in the buffer; waits until it is settled */
+    bool waited;     /* objects: its turn has come before; now it waits until it is settled */
 } umb_waiting;
 
 /* What the heap moves about: its order, and where the rest is. */
