@@ -58,9 +58,10 @@ format: ## lay out the sources as .clang-format says
 	@scripts/deps matrix
 	@git ls-files '*.c' '*.h' | xargs clang-format -i
 
-tidy: build ## clang-tidy over the sources
-	@scripts/deps matrix
-	@git ls-files 'src/*.c' 'tools/*.c' 'examples/*.c' | xargs -n 1 -P $(JOBS) clang-tidy --quiet -p build/release
+tidy: deps ## clang-tidy over the sources
+	@scripts/deps build matrix
+	@cmake --preset clang >/dev/null
+	@git ls-files 'src/*.c' 'tools/*.c' 'examples/*.c' | xargs -n 1 -P $(JOBS) clang-tidy --quiet -p build/clang 2>/dev/null
 
 clean: ## remove everything that was built or made
 	rm -rf build out

@@ -199,8 +199,8 @@ void oracle_clip(const oracle_view *v, float triangle[3][3], oracle_polygon *out
 void oracle_polygon_point(const oracle_polygon *p, uint32_t which, double pull, uint64_t random,
                           double out[3])
 {
-    const double *a = p->centre, *b = p->centre, *c = p->centre;
-    double u = 0.0, w = 0.0;
+    const double *a = p->centre, *b, *c;
+    double u, w;
     if (which == 0) {
         memcpy(out, p->centre, sizeof(p->centre));
         return;
