@@ -25,35 +25,73 @@ umb_image umb_image_of_bounds(const umb_raster_map *map, const umb_image_bounds 
     return image;
 }
 
-/* The corners of a box as the view sees them. slop: every vertex in the box has a world vertex within
- * this, per axis, of its exact image. */
-static double place_corners(const umb_raster_map *map, const umb_aabb *part, const umb_transform *t,
-                            bool identity, umb_view_point corner[8])
+/* A box under a transform as the view sees it: its middle, and half of each of its three edges. A corner is
+ * the middle with each half edge added or taken off. With fewer than 16 roundings to each coordinate, each
+ * relative to a term whose sum over the box is bounded by reach (times the map's scale), 16 units of that
+ * cover them. */
+typedef struct turned_box {
+    umb_view_point middle;
+    umb_view_point half[3];
+    double reach; /* at least the sum of absolute components of d at every corner */
+    double slop;  /* each vertex in the box has its world vertex within this, per axis, of its exact image */
+} turned_box;
+
+static umb_view_point see(const umb_raster_map *map, const double d[3])
+{
+    umb_vec3 v = umb_vec3_from_double(d);
+    umb_view_point p = {umb_vec3_dot(map->x, v), umb_vec3_dot(map->y, v), umb_vec3_dot(map->w, v),
+                        umb_vec3_sum_abs(v)};
+    return p;
+}
+
+static turned_box turn_box(const umb_raster_map *map, const umb_aabb *box, const umb_transform *t, bool identity)
 {
     const double eye[3] = {map->eye.x, map->eye.y, map->eye.z};
-    double slop = 0.0;
-    for (int k = 0; k < 8; ++k) {
-        double p[3], d[3];
-        for (int i = 0; i < 3; ++i) {
-            p[i] = (k >> i & 1) != 0 ? part->max[i] : part->min[i];
-        }
-        for (int i = 0; i < 3; ++i) {
-            double world = p[i], size = 0.0;
-            if (!identity) {
-                const float *m = t->m[i];
-                world = m[0] * p[0] + m[1] * p[1] + m[2] * p[2] + m[3];
-                size = fabs(m[0] * p[0]) + fabs(m[1] * p[1]) + fabs(m[2] * p[2]) + fabs(m[3]);
-            }
-            slop = 0x1p-23 * size > slop ? 0x1p-23 * size : slop;
-            d[i] = world - eye[i];
-        }
-        umb_vec3 v = umb_vec3_from_double(d);
-        corner[k].x = umb_vec3_dot(map->x, v);
-        corner[k].y = umb_vec3_dot(map->y, v);
-        corner[k].w = umb_vec3_dot(map->w, v);
-        corner[k].reach = umb_vec3_sum_abs(v);
+    double middle[3], half[3], far_corner[3];
+    turned_box r;
+    for (int i = 0; i < 3; ++i) {
+        middle[i] = 0.5 * ((double)box->min[i] + box->max[i]);
+        half[i] = 0.5 * ((double)box->max[i] - box->min[i]);
+        far_corner[i] = fabs(middle[i]) + half[i];
     }
-    return slop;
+    double d[3], edge[3][3] = {{0}};
+    r.slop = 0.0;
+    for (int i = 0; i < 3; ++i) {
+        if (identity) {
+            d[i] = middle[i] - eye[i];
+            edge[i][i] = half[i];
+            continue;
+        }
+        const float *m = t->m[i];
+        d[i] = m[0] * middle[0] + m[1] * middle[1] + m[2] * middle[2] + m[3] - eye[i];
+        double size = fabs((double)m[3]);
+        for (int j = 0; j < 3; ++j) {
+            edge[j][i] = m[j] * half[j];
+            size += fabs((double)m[j]) * far_corner[j];
+        }
+        r.slop = 0x1p-23 * size > r.slop ? 0x1p-23 * size : r.slop;
+    }
+    r.middle = see(map, d);
+    /* Rounding of the world coordinate itself is relative to its terms, which slop has the sum of. */
+    r.reach = r.middle.reach + 0x1p24 * r.slop;
+    for (int j = 0; j < 3; ++j) {
+        r.half[j] = see(map, edge[j]);
+        r.reach += r.half[j].reach;
+    }
+    return r;
+}
+
+static umb_view_point box_corner(const turned_box *b, int k)
+{
+    umb_view_point p = b->middle;
+    for (int j = 0; j < 3; ++j) {
+        double sign = (k >> j & 1) != 0 ? 1.0 : -1.0;
+        p.x += sign * b->half[j].x;
+        p.y += sign * b->half[j].y;
+        p.w += sign * b->half[j].w;
+    }
+    p.reach = b->reach;
+    return p;
 }
 
 /* The view's six sides as g(X, Y, W) >= 0 inside: depth, then the raster's borders. */
@@ -89,18 +127,19 @@ static double side_slack(const umb_raster_map *m, int side, double reach)
     return 64.0 * UMB_U * (m->scale * reach + across * (m->orthographic ? 1.0 : reach));
 }
 
-/* True if all corners lie beyond one of the raster's borders. What lies beyond near is tested by its image
+/* True if the box lies beyond one of the raster's borders. What lies beyond near is tested by its image
  * instead, which is cheaper. */
-static bool corners_beside(const umb_raster_map *map, const umb_view_point corner[8], double reach, double slop)
+static bool box_beside(const umb_raster_map *map, const turned_box *box)
 {
     double across = map->scale + fabs(map->cx) + fabs(map->cy) + map->width + map->height;
     for (int side = 2; side < SIDES; ++side) {
         double most = -INFINITY;
         for (int k = 0; k < 8; ++k) {
-            double g = side_value(map, side, &corner[k]);
+            umb_view_point p = box_corner(box, k);
+            double g = side_value(map, side, &p);
             most = g > most ? g : most;
         }
-        if (most < -(side_slack(map, side, reach) + 3.0 * slop * across)) {
+        if (most < -(side_slack(map, side, box->reach) + 3.0 * box->slop * across)) {
             return true;
         }
     }
@@ -110,29 +149,24 @@ static bool corners_beside(const umb_raster_map *map, const umb_view_point corne
 umb_depth_place umb_image_of_part(const umb_raster_map *map, const umb_aabb *part,
                                   const umb_transform *transform, bool identity, umb_image_bounds *out)
 {
-    umb_view_point corner[8];
-    double slop = place_corners(map, part, transform, identity, corner);
-    double reach = 0.0;
-    out->w_min = INFINITY;
-    out->w_max = -INFINITY;
-    for (int k = 0; k < 8; ++k) {
-        double error = 8.0 * UMB_U * corner[k].reach + 3.0 * slop;
-        out->w_min = corner[k].w - error < out->w_min ? corner[k].w - error : out->w_min;
-        out->w_max = corner[k].w + error > out->w_max ? corner[k].w + error : out->w_max;
-        reach = corner[k].reach > reach ? corner[k].reach : reach;
-    }
+    turned_box box = turn_box(map, part, transform, identity);
+    double deep = fabs(box.half[0].w) + fabs(box.half[1].w) + fabs(box.half[2].w);
+    double off = 16.0 * UMB_U * box.reach + 3.0 * box.slop;
+    out->w_min = box.middle.w - deep - off;
+    out->w_max = box.middle.w + deep + off;
     if (out->w_max < map->near_depth || out->w_min > map->far_depth) {
         return UMB_DEPTH_OUTSIDE;
     }
-    if (!(out->w_min >= map->near_depth)) {
-        return corners_beside(map, corner, reach, slop) ? UMB_DEPTH_OUTSIDE : UMB_DEPTH_CROSSING;
+    /* The bound of a projected corner holds while W's own error is a small part of W. */
+    if (!(out->w_min >= map->near_depth) || (!map->orthographic && !(out->w_min > 4.0 * off))) {
+        return box_beside(map, &box) ? UMB_DEPTH_OUTSIDE : UMB_DEPTH_CROSSING;
     }
     out->x_min = out->y_min = INFINITY;
     out->x_max = out->y_max = -INFINITY;
     for (int k = 0; k < 8; ++k) {
-        umb_raster_point p = umb_raster_map_project(map, corner[k], 8.0);
+        umb_raster_point p = umb_raster_map_project(map, box_corner(&box, k), 16.0);
         double a = map->scale + fabs(p.x - map->cx) + fabs(p.y - map->cy);
-        double error = p.error + 3.0 * slop * (map->orthographic ? map->scale : a / out->w_min);
+        double error = p.error + 3.0 * box.slop * (map->orthographic ? map->scale : a / out->w_min);
         out->x_min = p.x - error < out->x_min ? p.x - error : out->x_min;
         out->y_min = p.y - error < out->y_min ? p.y - error : out->y_min;
         out->x_max = p.x + error > out->x_max ? p.x + error : out->x_max;
