@@ -29,10 +29,11 @@ static void judge(const truth_result *r, const uint8_t *shown, uint32_t objects,
                 confirmed = both[k]->confirmed != 0 ? both[k] : confirmed;
             }
         }
-        if (confirmed != NULL && printed++ < MAX_PRINTED) {
+        if (confirmed != NULL && a->label != NULL && printed++ < MAX_PRINTED) {
             report(a->label, "wrongly hidden", i, confirmed);
         }
-        if (seen != NULL && confirmed == NULL && getenv("UMBRAGE_PRINT_UNCONFIRMED") != NULL) {
+        if (seen != NULL && confirmed == NULL && a->label != NULL &&
+            getenv("UMBRAGE_PRINT_UNCONFIRMED") != NULL) {
             report(a->label, "unconfirmed", i, seen);
         }
         a->sum->wrongly_hidden += confirmed != NULL;
@@ -66,7 +67,7 @@ bool strict_check_all(truth *t, const model *m, const umb_view *view, const stri
     umb_error error = {0};
     ok = ok && truth_view(t, view, &with, &result, &error);
     if (!ok) {
-        printf("# oracle: %s: %s\n", answers[0].label, error.text);
+        printf("# oracle: %s: %s\n", answers[0].label != NULL ? answers[0].label : "-", error.text);
     }
     for (uint32_t k = 0; ok && k < answer_count; ++k) {
         strict_count *sum = answers[k].sum;

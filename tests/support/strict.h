@@ -12,7 +12,7 @@ typedef struct strict_count {
 typedef struct strict_answer {
     const uint32_t *ids;
     uint32_t count;
-    const char *label; /* printed before each object that it hid wrongly */
+    const char *label; /* names the view where a wrongly hidden object is printed; NULL: none is */
     strict_count *sum; /* what is found is added here */
 } strict_answer;
 
