@@ -219,8 +219,21 @@ static umb_weld_stats weld(umb_scene *scene, uint32_t cluster)
     return stats;
 }
 
-/* A solid block of boxes, each face cut at random: one closed shell is left, of outer faces only. */
-static void test_stack_becomes_a_shell(void **state)
+/* The only occluder is a closed surface of so many triangles. */
+static void assert_closed_box(const umb_scene *scene, uint32_t triangles)
+{
+    assert_int_equal(umb_scene_occluder_count(scene), 1);
+    const umb_mesh *m = umb_scene_committed(scene)->occluders[0].mesh;
+    assert_int_equal(m->triangle_count, triangles);
+    assert_int_equal(m->edge_count, triangles * 3 / 2);
+    for (uint32_t i = 0; i < m->edge_count; ++i) {
+        assert_true(m->edges[i].f1 < triangles);
+    }
+}
+
+/* A solid block of boxes, each face cut at random: one closed shell is left, of outer faces only, and these
+ * are flat. */
+static void test_stack_becomes_a_box(void **state)
 {
     (void)state;
     dice d = {21};
@@ -244,19 +257,243 @@ static void test_stack_becomes_a_shell(void **state)
         uint32_t outer = 4 * (uint32_t)(size[0] * size[1] + size[1] * size[2] + size[2] * size[0]);
         assert_int_equal(stats.groups, 1);
         assert_int_equal(stats.objects, boxes);
-        assert_int_equal(stats.triangles_out, outer);
+        assert_int_equal(stats.triangles_out, 12);
+        assert_int_equal(stats.merged, outer / 2 + 2 - 8); /* Euler's: 2 vertices more than half the triangles */
         assert_int_equal(stats.sealed, 12 * boxes - outer);
-        assert_int_equal(umb_scene_occluder_count(scene), 1);
-        const umb_mesh *m = umb_scene_committed(scene)->occluders[0].mesh;
-        assert_int_equal(m->triangle_count, outer);
-        assert_int_equal(m->edge_count, outer * 3 / 2);
-        for (uint32_t i = 0; i < m->edge_count; ++i) {
-            assert_true(m->edges[i].f1 < outer);
-        }
+        assert_closed_box(scene, 12);
         soup after = take_soup(scene);
         compare_soups(&before, &after, &d, FIRST_SAME, 300, 6.0);
         free_soup(&before);
         free_soup(&after);
+        umb_scene_destroy(scene);
+    }
+}
+
+/* One floor of a building: walls under and over the plan (corners counter-clockwise seen from +z), and both
+ * ends; flats are the triangles of the plan. */
+static void add_floor(umb_scene *scene, dice *d, const float (*plan)[2], uint32_t n, const uint32_t (*flats)[3],
+                      float low, float high)
+{
+    float p[16][3];
+    uint32_t t[32][3], count = 0;
+    for (uint32_t i = 0; i < n; ++i) {
+        for (uint32_t k = 0; k < 2; ++k) {
+            p[2 * i + k][0] = plan[i][0];
+            p[2 * i + k][1] = plan[i][1];
+            p[2 * i + k][2] = k ? high : low;
+        }
+        uint32_t q[4] = {2 * i, 2 * ((i + 1) % n), 2 * ((i + 1) % n) + 1, 2 * i + 1}, s = dice_roll(d, 2);
+        uint32_t x[6] = {q[s], q[s + 1], q[(s + 2) % 4], q[s], q[(s + 2) % 4], q[(s + 3) % 4]};
+        memcpy(t[count], x, sizeof x);
+        count += 2;
+    }
+    for (uint32_t i = 0; i + 2 < n; ++i) {
+        for (uint32_t k = 0; k < 3; ++k) {
+            t[count][k] = 2 * flats[i][k] + 1;
+            t[count + 1][k] = 2 * flats[i][2 - k];
+        }
+        count += 2;
+    }
+    (void)add(scene, (const float(*)[3])p, 2 * n, (const uint32_t(*)[3])t, count, 0, NULL);
+}
+
+/* Floors of one plan, turned so that nothing but up is along an axis: a wall is two triangles, however many
+ * floors there are. */
+static void test_floors_become_a_building(void **state)
+{
+    (void)state;
+    static const float box[4][2] = {{0, 0}, {3, 0}, {3, 2}, {0, 2}};
+    static const float bent[6][2] = {{0, 0}, {4, 0}, {4, 1}, {2, 1}, {2, 3}, {0, 3}};
+    static const uint32_t box_flats[2][3] = {{0, 1, 2}, {0, 2, 3}};
+    static const uint32_t bent_flats[4][3] = {{0, 1, 3}, {1, 2, 3}, {0, 3, 4}, {0, 4, 5}};
+    dice d = {29};
+    for (int round = 0; round < 40; ++round) {
+        umb_scene *scene = make_scene();
+        uint32_t n = round % 2 ? 6 : 4, floors = 2 + dice_roll(&d, 20);
+        double angle = dice_roll(&d, 1000) / 100.0;
+        float plan[6][2], z = 0.0f;
+        for (uint32_t i = 0; i < n; ++i) {
+            double x = n == 6 ? bent[i][0] : box[i][0], y = n == 6 ? bent[i][1] : box[i][1];
+            plan[i][0] = (float)(x * cos(angle) - y * sin(angle));
+            plan[i][1] = (float)(x * sin(angle) + y * cos(angle));
+        }
+        for (uint32_t f = 0; f < floors; ++f) {
+            float high = z + 0.3f + (float)dice_roll(&d, 7) * 0.1f;
+            add_floor(scene, &d, (const float(*)[2])plan, n, n == 6 ? bent_flats : box_flats, z, high);
+            z = high;
+        }
+        assert_int_equal(umb_scene_commit(scene), UMB_OK);
+        soup before = take_soup(scene);
+        umb_weld_stats stats = weld(scene, 1u << 20);
+        assert_int_equal(stats.merged, n * (floors - 1));
+        assert_int_equal(stats.triangles_out, 4 * n - 4);
+        assert_closed_box(scene, 4 * n - 4);
+        soup after = take_soup(scene);
+        compare_soups(&before, &after, &d, FIRST_SAME, 100, 12.0);
+        free_soup(&before);
+        free_soup(&after);
+        umb_scene_destroy(scene);
+    }
+}
+
+enum { GRID = 9 };
+
+/* Rings repeat the triangles of other clusters: keep each once. */
+static void drop_repeated(soup *s)
+{
+    uint32_t n = 0;
+    for (uint32_t t = 0; t < s->count; ++t) {
+        uint32_t k = 0;
+        while (k < n && memcmp(s->corners[k], s->corners[t], sizeof s->corners[t]) != 0) {
+            ++k;
+        }
+        if (k == n) {
+            memmove(s->corners[n], s->corners[t], sizeof s->corners[t]);
+            s->two_sided[n++] = s->two_sided[t];
+        }
+    }
+    s->count = n;
+}
+
+/* How often a point of the grid's plane is covered, by one-sided (0) and by two-sided (1) triangles. All
+ * numbers are small integers over 4096: nothing is rounded. Triangles turn one way. */
+static void count_cover(const soup *s, double x, double y, int cover[2])
+{
+    cover[0] = cover[1] = 0;
+    for (uint32_t t = 0; t < s->count; ++t) {
+        bool inside = true;
+        for (int k = 0; k < 3; ++k) {
+            const float *a = s->corners[t][k], *b = s->corners[t][(k + 1) % 3];
+            double side = ((double)b[0] - a[0]) * (y - a[1]) - ((double)b[1] - a[1]) * (x - a[0]);
+            assert_true(side != 0.0);
+            inside = inside && side > 0.0;
+        }
+        cover[s->two_sided[t] ? 1 : 0] += inside ? 1 : 0;
+    }
+}
+
+/* The corner where cells a, b, c, d meet in turn is one of no outline, or lies on straight ones only. */
+static bool is_spare(int a, int b, int c, int d)
+{
+    return (a == b && c == d) || (b == c && d == a);
+}
+
+/* A flat grid with holes and two-sided cells in a slanted plane: each point of it is covered as before and
+ * once, and what vertices stay are the corners of the outlines. */
+static void test_flat_grids(void **state)
+{
+    (void)state;
+    dice d = {30};
+    for (int round = 0; round < 120; ++round) {
+        umb_scene *scene = make_scene();
+        int cells[GRID + 2][GRID + 2] = {{0}}; /* 0: a hole; 1: one-sided; 2: two-sided */
+        double slope = (double)dice_roll(&d, 5), lean = (double)dice_roll(&d, 5);
+        uint32_t holes = 2 + dice_roll(&d, 20), spare = 0;
+        for (int i = 1; i <= GRID; ++i) {
+            for (int j = 1; j <= GRID; ++j) {
+                cells[i][j] = dice_roll(&d, holes) == 0 ? 0 : dice_roll(&d, holes) == 0 ? 2 : 1;
+                float q[4][3];
+                uint32_t first = dice_roll(&d, 2);
+                for (uint32_t k = 0; k < 4; ++k) {
+                    uint32_t c = (k + first) % 4;
+                    q[k][0] = (float)(i + (c == 1 || c == 2));
+                    q[k][1] = (float)(j + (c >= 2));
+                    q[k][2] = (float)(slope * q[k][0] - lean * q[k][1]);
+                }
+                if (cells[i][j] != 0) {
+                    add_quad(scene, (const float(*)[3])q, cells[i][j] == 2 ? UMB_TRIANGLE_TWO_SIDED : 0);
+                }
+            }
+        }
+        for (int i = 0; i <= GRID; ++i) {
+            for (int j = 0; j <= GRID; ++j) {
+                int a = cells[i][j], b = cells[i + 1][j], c = cells[i + 1][j + 1], e = cells[i][j + 1];
+                bool any = a + b + c + e > 0;
+                spare += any && is_spare(a, b, c, e) ? 1 : 0;
+            }
+        }
+        assert_int_equal(umb_scene_commit(scene), UMB_OK);
+        umb_weld_stats stats = weld(scene, 1u << 20);
+        assert_int_equal(stats.merged, spare);
+        soup after = take_soup(scene);
+        drop_repeated(&after);
+        assert_int_equal(after.count, stats.triangles_out);
+        for (int i = 0; i <= GRID + 1; ++i) {
+            for (int j = 0; j <= GRID + 1; ++j) {
+                for (int k = 0; k < 4; ++k) {
+                    int cover[2];
+                    count_cover(&after, i + (k % 2 ? 2903 : 947) / 4096.0, j + (k / 2 ? 2749 : 1531) / 4096.0,
+                                cover);
+                    assert_int_equal(cover[0], cells[i][j] == 1);
+                    assert_int_equal(cover[1], cells[i][j] == 2);
+                }
+            }
+        }
+        free_soup(&after);
+        umb_scene_destroy(scene);
+    }
+}
+
+static bool uses_point(const umb_scene *scene, float x, float y, float z)
+{
+    soup s = take_soup(scene);
+    bool found = false;
+    for (uint32_t t = 0; t < s.count; ++t) {
+        for (int k = 0; k < 3; ++k) {
+            const float *p = s.corners[t][k];
+            found = found || (p[0] == x && p[1] == y && p[2] == z);
+        }
+    }
+    free_soup(&s);
+    return found;
+}
+
+/* Four squares around (1, 1, 0). What else is at that point speaks against taking it out, unless it is
+ * flat too; so does one bit of height. */
+static void test_what_touches_stays(void **state)
+{
+    (void)state;
+    enum { NOTHING, SPIKE, SPIKE_OF_OTHERS, FIN, BENT_FIN, TURNED, BUMP, CASES };
+    static const bool stays[CASES] = {false, true, true, false, true, true, true};
+    static const uint32_t merged[CASES] = {5, 3, 4, 3, 2, 2, 0};
+    for (int how = 0; how < CASES; ++how) {
+        umb_scene *scene = make_scene();
+        for (int i = 0; i < 4; ++i) {
+            float x = (float)(i % 2), y = (float)(i / 2);
+            float q[4][3] = {{x, y, 0}, {x + 1, y, 0}, {x + 1, y + 1, 0}, {x, y + 1, 0}};
+            for (int k = 0; k < 4 && how == BUMP; ++k) {
+                q[k][2] = q[k][0] == 1 && q[k][1] == 1 ? 0x1p-149f : 0.0f;
+            }
+            if (how == TURNED && i == 3) {
+                float swapped[3];
+                memcpy(swapped, q[1], sizeof swapped);
+                memcpy(q[1], q[3], sizeof swapped);
+                memcpy(q[3], swapped, sizeof swapped);
+            }
+            add_quad(scene, (const float(*)[3])q, 0);
+        }
+        static const uint32_t one[1][3] = {{0, 1, 2}}, two[2][3] = {{0, 1, 3}, {1, 2, 3}};
+        const float spike[3][3] = {{1, 1, 0}, {1.5f, 1, 3}, {1, 1.5f, 3}};
+        const float shared[3][3] = {{1, 1, 0}, {2, 1, 0}, {1, 1.5f, 3}};
+        const float fin[4][3] = {{0, 1, 0}, {1, 1, 0}, {2, 1, 0}, {1, how == BENT_FIN ? 1.5f : 1, 3}};
+        if (how == SPIKE_OF_OTHERS) {
+            (void)add(scene, spike, 3, one, 1, 0, NULL);
+        } else if (how == SPIKE) {
+            (void)add(scene, shared, 3, one, 1, 0, NULL);
+        } else if (how == FIN) {
+            (void)add(scene, fin, 4, two, 2, 0, NULL);
+        } else if (how == BENT_FIN) {
+            /* Each half flat, together not. */
+            const float bent[5][3] = {{0, 1, 0}, {1, 1, 0}, {2, 1, 0}, {1, 1.5f, 3}, {1, 0.5f, 3}};
+            static const uint32_t halves[2][3] = {{0, 1, 3}, {1, 2, 4}};
+            (void)add(scene, bent, 5, halves, 2, 0, NULL);
+        }
+        umb_weld_stats stats = weld(scene, 1000);
+        assert_int_equal(stats.groups, 1);
+        assert_int_equal(uses_point(scene, 1, 1, how == BUMP ? 0x1p-149f : 0.0f), stays[how]);
+        /* With it go the middles of the four sides, but not where a fin ends, an edge of a triangle out of
+           the plane begins, squares of unlike turn meet or the plane is bent. */
+        assert_int_equal(stats.merged, merged[how]);
         umb_scene_destroy(scene);
     }
 }
@@ -312,11 +549,12 @@ static void test_mess_blocks_the_same(void **state)
         sum.duplicates += stats.duplicates;
         sum.t_junctions += stats.t_junctions;
         sum.groups += stats.groups;
+        sum.merged += stats.merged;
         free_soup(&before);
         free_soup(&after);
         umb_scene_destroy(scene);
     }
-    assert_true(sum.duplicates > 20 && sum.t_junctions > 100 && sum.groups > 50);
+    assert_true(sum.duplicates > 20 && sum.t_junctions > 100 && sum.groups > 50 && sum.merged > 30);
 }
 
 /* Boxes that do not overlap: from outside nothing changes at all, whatever was sealed. */
@@ -324,7 +562,7 @@ static void test_sealing_from_outside(void **state)
 {
     (void)state;
     dice d = {23};
-    uint32_t sealed = 0;
+    uint32_t sealed = 0, merged = 0;
     for (int round = 0; round < 60; ++round) {
         umb_scene *scene = make_scene();
         for (int i = 0; i < 27; ++i) {
@@ -336,14 +574,16 @@ static void test_sealing_from_outside(void **state)
         }
         assert_int_equal(umb_scene_commit(scene), UMB_OK);
         soup before = take_soup(scene);
-        sealed += weld(scene, 40).sealed;
+        umb_weld_stats stats = weld(scene, 40);
+        sealed += stats.sealed;
+        merged += stats.merged;
         soup after = take_soup(scene);
         compare_soups(&before, &after, &d, FIRST_SAME, 200, 8.0);
         free_soup(&before);
         free_soup(&after);
         umb_scene_destroy(scene);
     }
-    assert_true(sealed > 1000);
+    assert_true(sealed > 1000 && merged > 500);
 }
 
 /* Length of the edges of all occluders that have one triangle only. */
@@ -364,26 +604,35 @@ static double open_length(const umb_scene *scene)
 }
 
 /* A wide sheet above many narrow ones: one surface with nothing open but its rim. Along an axis, and
- * slanted; the ends in the middle of the row lie on the wide sheet's edge alone. */
+ * slanted; the ends in the middle of the row lie on the wide sheet's edge alone. Flat, the sheets are one in
+ * the end; folded, every end stays. */
 static void test_t_junctions(void **state)
 {
     (void)state;
-    for (int slanted = 0; slanted < 2; ++slanted) {
+    for (int how = 0; how < 4; ++how) {
         umb_scene *scene = make_scene();
+        bool slanted = how % 2 != 0, folded = how >= 2;
         float dx = slanted ? 3.0f : 5.0f, dy = slanted ? 4.0f : 0.0f;
         float wide[4][3] = {{0, 0, 1}, {dx * 7, dy * 7, 1}, {dx * 7, dy * 7, 2}, {0, 0, 2}};
         add_quad(scene, (const float(*)[3])wide, 0);
         for (int i = 0; i < 7; ++i) {
             float a = (float)i, b = a + 1;
-            float q[4][3] = {{dx * a, dy * a, 0}, {dx * b, dy * b, 0}, {dx * b, dy * b, 1}, {dx * a, dy * a, 1}};
+            float fold = folded ? 1.0f : 0.0f, fa = i % 2 ? 0.0f : fold, fb = i % 2 ? fold : 0.0f;
+            float q[4][3] = {{dx * a - dy * fa, dy * a + dx * fa, 0},
+                             {dx * b - dy * fb, dy * b + dx * fb, 0},
+                             {dx * b, dy * b, 1},
+                             {dx * a, dy * a, 1}};
             add_quad(scene, (const float(*)[3])q, 0);
         }
         umb_weld_stats stats = weld(scene, 1000);
         assert_int_equal(stats.t_junctions, 6);
         assert_int_equal(stats.groups, 1);
         assert_int_equal(stats.occluders, 1);
-        assert_int_equal(stats.triangles_out, 16 + 6);
-        assert_true(fabs(open_length(scene) - (2 * 35.0 + 2 * 2.0)) < 1e-9);
+        assert_int_equal(stats.merged, folded ? 0 : 14);
+        assert_int_equal(stats.triangles_out, folded ? 16 + 6 : 2);
+        /* A folded end is moved by one length of (dx, dy) across: 5. */
+        double rim = folded ? 7 * sqrt(50.0) + 35.0 + 2.0 + 1.0 + sqrt(26.0) : 2 * 35.0 + 2 * 2.0;
+        assert_true(fabs(open_length(scene) - rim) < 1e-9);
         umb_scene_destroy(scene);
     }
 }
@@ -600,7 +849,7 @@ static void test_dissolve(void **state)
             break;
         }
         assert_int_equal(c->occluder_count, 2); /* not before the commit */
-        assert_int_equal(c->occluders[0].mesh->triangle_count, 28);
+        assert_int_equal(c->occluders[0].mesh->triangle_count, 12);
         assert_int_equal(umb_scene_commit(scene), UMB_OK);
         assert_int_equal(c->first_free_occluder, how == 0 ? 3 : 2);
         assert_int_equal(c->occluder_count, c->first_free_occluder + 1);
@@ -685,11 +934,13 @@ static void test_failing_memory(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_stack_becomes_a_shell), cmocka_unit_test(test_mess_blocks_the_same),
+        cmocka_unit_test(test_stack_becomes_a_box), cmocka_unit_test(test_mess_blocks_the_same),
         cmocka_unit_test(test_sealing_from_outside), cmocka_unit_test(test_t_junctions),
         cmocka_unit_test(test_thin_walls_stay), cmocka_unit_test(test_workers_change_nothing),
         cmocka_unit_test(test_rings_leave_no_pinholes), cmocka_unit_test(test_big_and_mirrored),
         cmocka_unit_test(test_dissolve), cmocka_unit_test(test_members), cmocka_unit_test(test_failing_memory),
+        cmocka_unit_test(test_floors_become_a_building), cmocka_unit_test(test_flat_grids),
+        cmocka_unit_test(test_what_touches_stays),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -105,12 +105,15 @@ typedef struct umb_weld_stats {
     uint32_t duplicates;   /* triangles dropped because an equal one stays */
     uint32_t sealed;       /* triangles dropped in pairs that lie face to face */
     uint32_t t_junctions;  /* vertices found exactly on another triangle's edge and inserted there */
+    uint32_t merged;       /* vertices taken out of flat surfaces and straight edges, which cover the same
+                              points with fewer triangles */
 } umb_weld_stats;
 
 /* Join static objects that touch, by exactly equal vertex positions, into occluders of their own, so
  * that the seams between level faces or wall pieces are no cracks. Equal triangles are kept once,
- * triangles face to face are dropped, vertices that lie exactly on an edge split it. What a welded
- * occluder covers is a subset of what its objects' blocking triangles cover, plus nothing.
+ * triangles face to face are dropped, vertices that lie exactly on an edge split it. Then surfaces that
+ * are exactly flat are made of fewer triangles, which cover the very same points. What a welded occluder
+ * covers is a subset of what its objects' blocking triangles cover, plus nothing.
  * Objects that touch no other keep hiding by their own shape. Call it after the static objects are in;
  * calling it again redoes the work. Takes effect at the next commit. stats may be NULL. */
 UMB_API umb_result umb_scene_weld(umb_scene *scene, const umb_weld_def *def, umb_weld_stats *stats);

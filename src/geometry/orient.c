@@ -13,8 +13,8 @@
 /* Add det(p, q, r), or its negative, to the terms. A product of two floats has 48 bits: an exact double,
  * which Veltkamp's split cuts in halves of 24, so that each times a third float is exact again.
  * Exponents stay in [-447, 384]. */
-static void add_determinant(double *terms, int *count, const float *p, const float *q, const float *r,
-                            double sign)
+static void add_determinant(double *terms, int *count, const float *p, const float *q,
+                            const float *r, double sign)
 {
     for (int k = 0; k < 6; ++k) {
         int i = k % 3, j = (i + (k < 3 ? 1 : 2)) % 3, l = 3 - i - j;
@@ -74,7 +74,7 @@ static bool by_integers(double m[3][3], int *sign)
             return false;
         }
     }
-    /* Six products below 2^123. */
+    /* Three terms below 2^124. */
     wide sum = 0;
     for (int i = 0; i < 3; ++i) {
         const int64_t *p = n[(i + 1) % 3], *q = n[(i + 2) % 3];
@@ -109,7 +109,7 @@ int umb_orient(const float a[3], const float b[3], const float c[3], const float
     if (fabs(sum) > size * 0x1p-49) {
         return sum > 0.0 ? 1 : -1;
     }
-    if (size == 0.0 && exact) {
+    if (size == 0.0) {
         return 0;
     }
 #ifdef __SIZEOF_INT128__

@@ -1,5 +1,5 @@
-/* Joining static objects that touch: umb_scene_weld(). The steps are in weld_seal.c, weld_split.c and
- * weld_cluster.c; weld_group.c says how welds end. */
+/* Joining static objects that touch: umb_scene_weld(). The steps are in weld_seal.c, weld_split.c,
+ * weld_merge.c and weld_cluster.c; weld_group.c says how welds end. */
 #include "weld_soup.h"
 
 #define DEFAULT_CLUSTER 16u
@@ -53,7 +53,8 @@ static umb_result weld(umb_scene *scene, umb_weld_soup *soup, umb_scratch *scrat
     }
     umb_weld_group **groups = NULL;
     uint32_t count = 0;
-    if (!clean(soup) || !umb_weld_cluster(soup, scratch, cluster_triangles, ring, &groups, &count)) {
+    if (!clean(soup) || !umb_weld_unite(soup) || !umb_weld_merge(soup) ||
+        !umb_weld_cluster(soup, scratch, cluster_triangles, ring, &groups, &count)) {
         return UMB_ERROR_MEMORY;
     }
     if (!umb_memory_reserve(&scene->allocator, (void **)&scene->groups, &scene->group_capacity, count,

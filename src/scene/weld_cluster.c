@@ -52,22 +52,6 @@ typedef struct mesh_task {
     umb_mesh **meshes;
 } mesh_task;
 
-static bool unite_neighbours(umb_weld_soup *soup, umb_scratch *scratch)
-{
-    umb_weld_edges edges;
-    if (!umb_weld_edges_build(&edges, scratch, soup)) {
-        return false;
-    }
-    for (uint32_t i = 1; i < edges.count; ++i) {
-        if (edges.keys[i] == edges.keys[i - 1]) {
-            umb_weld_soup_unite(soup, soup->triangles[edges.halves[i] / 3].object,
-                                soup->triangles[edges.halves[i - 1] / 3].object);
-        }
-    }
-    umb_weld_edges_drop(&edges, scratch);
-    return true;
-}
-
 /* Which sets of objects become groups, numbered by their lowest object. */
 static bool choose_groups(clusterer *c)
 {
@@ -90,7 +74,8 @@ static bool choose_groups(clusterer *c)
         if (root != i) {
             c->group_of[i] = c->group_of[root];
         } else if (triangles[i] > 0 &&
-                   (members[i] > 1 || triangles[i] > (uint64_t)SMALL_GROUP * c->target)) {
+                   (members[i] > 1 ||
+                    (uint64_t)triangles[i] + soup->merged[i] > (uint64_t)SMALL_GROUP * c->target)) {
             c->group_of[i] = c->group_count++;
             c->order_count += triangles[i];
         } else {
@@ -371,7 +356,7 @@ static bool make_groups(const clusterer *c, umb_weld_group **groups)
 
 static bool build(clusterer *c, umb_weld_group ***out)
 {
-    if (!unite_neighbours(c->soup, c->scratch) || !choose_groups(c) || !cut_groups(c) || !add_rings(c)) {
+    if (!choose_groups(c) || !cut_groups(c) || !add_rings(c)) {
         return false;
     }
     umb_mesh **meshes = umb_scratch_get_zero(c->scratch, c->cluster_count, sizeof *meshes);

@@ -136,7 +136,8 @@ umb_result umb_weld_soup_collect(umb_weld_soup *soup, umb_scene *scene)
 {
     soup->object_count = scene->object_ids.used;
     soup->parents = umb_memory_allocate_zero(soup->allocator, soup->object_count, sizeof *soup->parents);
-    if (soup->parents == NULL) {
+    soup->merged = umb_memory_allocate_zero(soup->allocator, soup->object_count, sizeof *soup->merged);
+    if (soup->parents == NULL || soup->merged == NULL) {
         return UMB_ERROR_MEMORY;
     }
     for (uint32_t i = 0; i < soup->object_count; ++i) {
@@ -153,6 +154,7 @@ void umb_weld_soup_free(umb_weld_soup *soup)
     umb_memory_free(soup->allocator, soup->positions, soup->position_capacity * sizeof *soup->positions);
     umb_memory_free(soup->allocator, soup->triangles, soup->triangle_capacity * sizeof *soup->triangles);
     umb_memory_free(soup->allocator, soup->parents, soup->object_count * sizeof *soup->parents);
+    umb_memory_free(soup->allocator, soup->merged, soup->object_count * sizeof *soup->merged);
 }
 
 uint32_t umb_weld_soup_root(umb_weld_soup *soup, uint32_t object)
@@ -214,4 +216,19 @@ void umb_weld_edges_drop(umb_weld_edges *edges, umb_scratch *scratch)
 {
     umb_scratch_drop(scratch, edges->keys);
     umb_scratch_drop(scratch, edges->halves);
+}
+
+bool umb_weld_unite(umb_weld_soup *soup)
+{
+    umb_scratch scratch = {.allocator = soup->allocator};
+    umb_weld_edges edges;
+    bool ok = umb_weld_edges_build(&edges, &scratch, soup);
+    for (uint32_t i = 1; ok && i < edges.count; ++i) {
+        if (edges.keys[i] == edges.keys[i - 1]) {
+            umb_weld_soup_unite(soup, soup->triangles[edges.halves[i] / 3].object,
+                                soup->triangles[edges.halves[i - 1] / 3].object);
+        }
+    }
+    umb_scratch_free(&scratch);
+    return ok;
 }

@@ -21,6 +21,7 @@ typedef struct umb_weld_soup {
     size_t position_capacity, triangle_capacity;
     uint32_t position_count, triangle_count;
     uint32_t *parents; /* union-find over objects: which touch */
+    uint32_t *merged;  /* per object that stands for those it touches: triangles saved by merging */
     uint32_t object_count;
     umb_weld_stats stats;
 } umb_weld_soup;
@@ -60,6 +61,12 @@ bool umb_weld_seal(umb_weld_soup *soup);
 
 /* Vertices that lie exactly on an edge that has no partner split it. */
 bool umb_weld_split(umb_weld_soup *soup);
+
+/* Objects with triangles at one edge touch. */
+bool umb_weld_unite(umb_weld_soup *soup);
+
+/* Vertices that a flat surface can do without are taken out. After umb_weld_unite(). */
+bool umb_weld_merge(umb_weld_soup *soup);
 
 /* Groups of objects that touch, cut into clusters with their meshes. On success *groups is an array of
  * the scratch memory; the caller owns the groups themselves. */

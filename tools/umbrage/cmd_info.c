@@ -83,6 +83,7 @@ static void put_weld(json_text *j, const umb_weld_stats *w)
     json_text_count(j, "duplicates", w->duplicates);
     json_text_count(j, "sealed", w->sealed);
     json_text_count(j, "t_junctions", w->t_junctions);
+    json_text_count(j, "merged", w->merged);
     json_text_close(j, '}');
 }
 
