@@ -26,6 +26,9 @@
 #include "weld_soup.h"
 
 #define STAR_LIMIT 64u /* triangles at a vertex that is tried */
+#define GROUP_LIMIT 1024u /* groups of more triangles are left: a plain or a level's floor in one piece is drawn
+                             when its nearest point is reached, and its far end spoils the depth of what
+                             it covers there */
 
 /* The triangles (v, from, to) around a vertex. */
 typedef struct star {
@@ -50,6 +53,7 @@ typedef struct merger {
     /* Vertices to be tried: a ring with room for each once. */
     uint32_t *queue;
     uint8_t *queued;
+    uint32_t *sizes; /* triangles of each group, by its root */
     uint32_t first, waiting;
     star star;
     umb_weld_triangle made[STAR_LIMIT];
@@ -109,7 +113,7 @@ static uint32_t dequeue(merger *m)
     return v;
 }
 
-/* The triangles around v; false if they are none, too many or not of one group. */
+/* The triangles around v; false if they are none, too many or not of one group of the right size. */
 static bool gather(merger *m, uint32_t v)
 {
     star *s = &m->star;
@@ -118,7 +122,7 @@ static bool gather(merger *m, uint32_t v)
     uint32_t root = UMB_NONE;
     for (uint32_t c = m->heads[v]; c != UMB_NONE; c = m->next[c]) {
         uint32_t r = umb_weld_soup_root(m->soup, m->soup->triangles[c / 3].object);
-        if (s->count == STAR_LIMIT || (root != UMB_NONE && r != root)) {
+        if (s->count == STAR_LIMIT || (root != UMB_NONE && r != root) || m->sizes[r] > GROUP_LIMIT) {
             return false;
         }
         root = r;
@@ -367,10 +371,14 @@ static bool prepare(merger *m, umb_scratch *scratch)
     m->previous = umb_scratch_get(scratch, corners, sizeof *m->previous);
     m->queue = umb_scratch_get(scratch, vertices, sizeof *m->queue);
     m->queued = umb_scratch_get_zero(scratch, vertices, sizeof *m->queued);
+    m->sizes = umb_scratch_get_zero(scratch, m->soup->object_count, sizeof *m->sizes);
     if (scratch->failed) {
         return false;
     }
     memset(m->heads, 0xFF, vertices * sizeof *m->heads);
+    for (uint32_t t = 0; t < m->soup->triangle_count; ++t) {
+        m->sizes[umb_weld_soup_root(m->soup, m->soup->triangles[t].object)] += 1;
+    }
     for (uint32_t c = 0; c < corners; ++c) {
         link_corner(m, c);
     }
