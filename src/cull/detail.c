@@ -25,6 +25,40 @@ static void place_triangle(const umb_object *o, const uint32_t corner[3], float 
     }
 }
 
+/* True if the middle of a triangle is open to the eye: most visible things are found by this alone. */
+static bool middle_shows(const umb_asker *a, const float world[3][3], double *settled)
+{
+    const umb_raster_map *map = a->map;
+    umb_view_point middle = {0.0, 0.0, 0.0, 0.0};
+    double deepest = -INFINITY;
+    for (int k = 0; k < 3; ++k) {
+        umb_view_point v = umb_raster_map_point(map, world[k]);
+        middle.x += v.x * (1.0 / 3.0);
+        middle.y += v.y * (1.0 / 3.0);
+        middle.w += v.w * (1.0 / 3.0);
+        deepest = v.w > deepest ? v.w : deepest;
+    }
+    if (!(middle.w > map->near_depth && middle.w < map->far_depth)) {
+        return false;
+    }
+    double r = map->orthographic ? 1.0 : 1.0 / middle.w;
+    *settled = deepest < map->far_depth ? deepest : map->far_depth;
+    return a->ops->open_at(a->method, middle.x * r + map->cx, middle.y * r + map->cy,
+                           map->orthographic ? -middle.w : r);
+}
+
+static bool leaf_middle_shows(const umb_asker *a, const umb_object *o, const umb_part *part, double *settled)
+{
+    for (uint32_t i = part->begin; i < part->end; ++i) {
+        float world[3][3];
+        place_triangle(o, o->mesh->triangles[o->mesh->part_order[i]], world);
+        if (middle_shows(a, (const float(*)[3])world, settled)) {
+            return true;
+        }
+    }
+    return false;
+}
+
 static bool triangle_shows(const umb_asker *a, uint32_t ref, const float world[3][3], const umb_face *face,
                            double *settled)
 {
@@ -87,6 +121,9 @@ bool umb_detail_shows(const umb_asker *a, const umb_object *o, uint32_t ref, uin
     while (*part < mesh->part_count) {
         const umb_part *p = &mesh->parts[*part];
         bool leaf = p->skip == *part + 1;
+        if (leaf && leaf_middle_shows(a, o, p, settled)) {
+            return true;
+        }
         bool shows = box_shows(a, o, ref, *part);
         if (shows && leaf) {
             shows = leaf_shows(a, o, ref, p, settled);

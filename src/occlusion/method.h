@@ -39,6 +39,9 @@ typedef struct umb_method_ops {
     void (*destroy)(void *state);
     umb_result (*prepare)(void *state, const umb_raster_map *map, const umb_committed *scene);
     void (*submit)(const void *state, const umb_query *queries, uint32_t count, umb_verdict *verdicts);
+    /* True if something of this nearness at a raster point would surely not be found hidden: a cheap first
+       question, whose answer false says nothing. */
+    bool (*open_at)(const void *state, double x, double y, double nearness);
     /* True if the answers to later queries may differ for it. */
     bool (*occlude)(void *state, uint32_t occluder, umb_cull_stats *stats);
     const umb_coverage *(*buffer)(const void *state);

@@ -113,6 +113,18 @@ static void submit(const void *state, const umb_query *queries, uint32_t count, 
     }
 }
 
+static bool open_at(const void *state, double x, double y, double nearness)
+{
+    const umb_coverage *c = &((const raster *)state)->coverage;
+    if (!(x >= 0.0 && y >= 0.0 && x < c->width && y < c->height)) {
+        return false;
+    }
+    uint32_t column = (uint32_t)x, row = (uint32_t)y;
+    const umb_tile *t = &c->tiles[(size_t)(row / UMB_TILE_HEIGHT) * c->columns + column / UMB_TILE_WIDTH];
+    uint32_t r = row % UMB_TILE_HEIGHT, bit = column % UMB_TILE_WIDTH;
+    return (t->mask[r] >> bit & 1u) == 0 || t->z[4 * (r / 4) + bit / 8] < nearness;
+}
+
 /* Pixels and tiles of the silhouette's box. */
 typedef struct window {
     uint32_t x0, y0, x1, y1;
@@ -216,13 +228,13 @@ typedef enum overlap {
     HOLDS
 } overlap;
 
-/* How a triangle's image lies to the closed sub-tile at (x, y). */
-static overlap place_sub_tile(const umb_depth_triangle *t, double x, double y)
+/* How a triangle's image lies to a closed rectangle of the raster, as far as its sides tell. */
+static overlap place_rect(const umb_depth_triangle *t, double x, double y, double width, double height)
 {
     bool holds = t->side_count > 0;
     for (uint32_t i = 0; i < t->side_count; ++i) {
         double at = t->ex[i] * x + t->ey[i] * y + t->e0[i];
-        double wide = t->ex[i] * 8.0, high = t->ey[i] * 4.0;
+        double wide = t->ex[i] * width, high = t->ey[i] * height;
         double most = at + (wide > 0.0 ? wide : 0.0) + (high > 0.0 ? high : 0.0);
         double least = at + (wide < 0.0 ? wide : 0.0) + (high < 0.0 ? high : 0.0);
         if (most < -t->margin[i]) {
@@ -247,14 +259,21 @@ static void lower_tile(window_tile *tile, uint8_t wanted, const umb_front_triang
                        const umb_depth_triangle *t, uint32_t tx, uint32_t ty)
 {
     double x0 = tx * UMB_TILE_WIDTH, y0 = ty * UMB_TILE_HEIGHT;
+    overlap whole = place_rect(t, x0, y0, UMB_TILE_WIDTH, UMB_TILE_HEIGHT);
+    if (whole == BESIDE) {
+        return;
+    }
     int i0, i1, j0, j1;
     sub_tile_range(front->x_min, front->x_max, x0, 8.0, 4, &i0, &i1);
     sub_tile_range(front->y_min, front->y_max, y0, 4.0, 2, &j0, &j1);
     for (int j = j0; j <= j1; ++j) {
         for (int i = i0; i <= i1; ++i) {
-            double x = x0 + 8.0 * i, y = y0 + 4.0 * j;
             int s = 4 * j + i;
-            overlap place = (wanted >> s & 1) != 0 ? place_sub_tile(t, x, y) : BESIDE;
+            if ((wanted >> s & 1) == 0) {
+                continue;
+            }
+            double x = x0 + 8.0 * i, y = y0 + 4.0 * j;
+            overlap place = whole == HOLDS ? HOLDS : place_rect(t, x, y, 8.0, 4.0);
             if (place == BESIDE) {
                 continue;
             }
@@ -336,5 +355,5 @@ static const umb_coverage *buffer(const void *state)
 }
 
 const umb_method_ops umb_raster_method = {
-    "raster", UMB_CLASS_STRICT, create, destroy, prepare, submit, occlude, buffer,
+    "raster", UMB_CLASS_STRICT, create, destroy, prepare, submit, open_at, occlude, buffer,
 };
