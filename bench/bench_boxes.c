@@ -1,6 +1,6 @@
 /* What a box costs: the strict frustum test and the projection of eight boxes at once, for each
- * instruction set, beside the yardstick (yardstick.h), all on one set of boxes that fits no cache level
- * but the last, and on one that fits the first.
+ * instruction set, beside the yardstick (yardstick.h), all on one set of boxes that fits no cache
+ * level but the last, and on one that fits the first.
  *
  *     bench_boxes [boxes]
  */

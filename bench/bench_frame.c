@@ -1,10 +1,11 @@
 /* What a frame costs: bench_frame [SCENE [PATH [LIMIT]]]
  *
- * Along a path, on one thread: the yardstick (one plain pass over all boxes against six planes, bit mask
- * out, no hierarchy, no bounds of rounding), the culler over the flat index and over the default index
- * without occlusion, and the default method. Medians over the views of the least of five rounds; the
- * first round is not counted (buffers grow there). The measure is the last in yardstick passes: it says the
- * same on a slow machine and a fast one. Exit code 1 when it is above LIMIT (30). */
+ * Along a path, on one thread: the yardstick (one plain pass over all boxes against six planes, bit
+ * mask out, no hierarchy, no bounds of rounding), the culler over the flat index and over the
+ * default index without occlusion, and the default method. Medians over the views of the least of
+ * five rounds; the first round is not counted (buffers grow there). The measure is the last in
+ * yardstick passes: it says the same on a slow machine and a fast one. Exit code 1 when it is above
+ * LIMIT (30). */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -50,7 +51,8 @@ static bool view_of(const model *m, const double row[6], umb_view *out)
                             extent + 1.0) == UMB_OK;
 }
 
-/* Least time of each view over the rounds: what is left is the work, not the machine's other business. */
+/* Least time of each view over the rounds: what is left is the work, not the machine's other
+ * business. */
 static bool walk(umb_culler *culler, const umb_view *views, uint32_t count, configuration *c,
                  double *times)
 {
@@ -93,8 +95,8 @@ static bool measure(umb_scene *scene, const umb_view *views, uint32_t count, con
 }
 
 /* The yardstick over every object's box, per view. */
-static bool measure_yardstick(const umb_scene *scene, const umb_view *views, uint32_t count, configuration *c,
-                              double *times)
+static bool measure_yardstick(const umb_scene *scene, const umb_view *views, uint32_t count,
+                              configuration *c, double *times)
 {
     uint32_t n = umb_scene_object_count(scene);
     float *boxes[6];
@@ -195,8 +197,9 @@ int main(int argc, char **argv)
                all[i].worst, all[i].median / all[0].median);
     }
     double ratio = all[3].median / all[0].median;
-    printf("a frame costs %.1f yardstick passes (and %.1f of the flat culler's), at most %.0f are allowed\n", ratio,
-           all[3].median / all[1].median, limit);
+    printf("a frame costs %.1f yardstick passes (and %.1f of the flat culler's), at most %.0f are "
+           "allowed\n",
+           ratio, all[3].median / all[1].median, limit);
 
     free(times);
     free(views);

@@ -27,7 +27,8 @@ typedef struct guard {
     uint32_t seen;
 } guard;
 
-/* Every call that can fail returns an umb_result; a program that cannot go on says why and stops. */
+/* Every call that can fail returns an umb_result; a program that cannot go on says why and
+ * stops. */
 static void must(umb_result result, const char *what)
 {
     if (result != UMB_OK) {

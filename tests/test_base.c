@@ -92,11 +92,13 @@ static void test_sort(void **state)
         for (size_t i = 0; i < n; ++i) {
             assert_true(keys[i] == original[values[i]]);
             if (i > 0) {
-                assert_true(keys[i - 1] < keys[i] || (keys[i - 1] == keys[i] && values[i - 1] < values[i]));
+                assert_true(keys[i - 1] < keys[i] ||
+                            (keys[i - 1] == keys[i] && values[i - 1] < values[i]));
             }
         }
     }
-    static const float ordered[] = {-HUGE_VALF, -3e38f, -1.0f, -1e-45f, 0.0f, 1e-45f, 1.0f, HUGE_VALF};
+    static const float ordered[] = {-HUGE_VALF, -3e38f, -1.0f, -1e-45f,
+                                    0.0f,       1e-45f, 1.0f,  HUGE_VALF};
     for (int i = 0; i + 1 < 8; ++i) {
         assert_true(umb_sort_float(ordered[i]) < umb_sort_float(ordered[i + 1]));
     }
@@ -128,7 +130,9 @@ static void test_collinear(void **state)
             }
         }
         for (int k = 0; k < 9; ++k) { /* scaling by a power of two changes no sign */
-            f[k / 3][k % 3] = ldexpf((float)p[k / 3][k % 3], round % 5 == 0 ? -140 : round % 7 == 0 ? 100 : -9);
+            f[k / 3][k % 3] = ldexpf((float)p[k / 3][k % 3], round % 5 == 0   ? -140
+                                                             : round % 7 == 0 ? 100
+                                                                              : -9);
         }
         bool line = true;
         for (int k = 0; k < 3; ++k) {
@@ -142,11 +146,13 @@ static void test_collinear(void **state)
             along += (p[2][k] - p[0][k]) * (p[1][k] - p[0][k]);
             length += (p[1][k] - p[0][k]) * (p[1][k] - p[0][k]);
         }
-        assert_int_equal(umb_collinear_inside(f[0], f[1], f[2]), line && along > 0 && along < length);
+        assert_int_equal(umb_collinear_inside(f[0], f[1], f[2]),
+                         line && along > 0 && along < length);
     }
     static const float huge[3][3] = {{3e38f, -3e38f, 1e-45f}, {-3e38f, 3e38f, -1e-45f}, {0, 0, 0}};
     assert_true(umb_collinear_inside(huge[0], huge[1], huge[2]));
-    static const float near[3][3] = {{3e38f, -3e38f, 1e-45f}, {-3e38f, 3e38f, -1e-45f}, {0, 1e-45f, 0}};
+    static const float near[3][3] = {
+        {3e38f, -3e38f, 1e-45f}, {-3e38f, 3e38f, -1e-45f}, {0, 1e-45f, 0}};
     assert_false(umb_collinear_inside(near[0], near[1], near[2]));
 }
 
@@ -250,8 +256,9 @@ static void test_isa(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_memory), cmocka_unit_test(test_error_text), cmocka_unit_test(test_sort),
-        cmocka_unit_test(test_collinear), cmocka_unit_test(test_transform), cmocka_unit_test(test_pool),
+        cmocka_unit_test(test_memory),    cmocka_unit_test(test_error_text),
+        cmocka_unit_test(test_sort),      cmocka_unit_test(test_collinear),
+        cmocka_unit_test(test_transform), cmocka_unit_test(test_pool),
         cmocka_unit_test(test_isa),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,5 +1,5 @@
-/* The generated scene `blocks` with its 64 views, and the slit test: figures that other programs can be
- * compared with, through the public headers alone. */
+/* The generated scene `blocks` with its 64 views, and the slit test: figures that other programs
+ * can be compared with, through the public headers alone. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -116,7 +116,8 @@ static double unit(uint64_t *state)
     return (double)((z ^ (z >> 31)) >> 11) * 0x1p-53;
 }
 
-/* Two walls of 12 x 12 x 0.01 at depth 10 with a slit between them, a box of 2 x 2 x 0.5 at depth 20:
+/* Two walls of 12 x 12 x 0.01 at depth 10 with a slit between them, a box of 2 x 2 x 0.5 at depth
+ * 20:
  *
  *      #########  #########    depth 10; seen from above, before the roll about the view's axis
  *                [box]         depth 20: centred behind the slit, or off to the side behind a wall
@@ -203,8 +204,8 @@ static void check_slits(slit *s, const uint32_t raster[2], uint32_t trials)
         slit_place(s, s->box, roll, 2 * off, 2 * along, 20, box);
         assert_int_equal(umb_scene_commit(s->scene), UMB_OK);
         wrong += !slit_sees(s->culler, &view, s->box);
-        /* The control: five units aside at depth 20, its image at the walls' depth ends two before the
-         * slit, less half the slit. */
+        /* The control: five units aside at depth 20, its image at the walls' depth ends two before
+         * the slit, less half the slit. */
         slit_place(s, s->box, roll, 2 * off + (k % 2 != 0 ? 5 : -5), 2 * along, 20, box);
         assert_int_equal(umb_scene_commit(s->scene), UMB_OK);
         assert_true(slit_sees(s->frustum, &view, s->box));

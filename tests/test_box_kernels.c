@@ -1,4 +1,5 @@
-/* Boxes onto the raster: every point of a box, in wider arithmetic, lies in the bounds given for it. */
+/* Boxes onto the raster: every point of a box, in wider arithmetic, lies in the bounds given for
+ * it. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -11,7 +12,8 @@
 
 static const umb_isa isas[] = {UMB_ISA_SCALAR, UMB_ISA_SSE4, UMB_ISA_AVX2, UMB_ISA_NEON};
 
-/* A raster over a view, as a culler would lay it; or, for every third, any invertible rows at all. */
+/* A raster over a view, as a culler would lay it; or, for every third, any invertible rows at
+ * all. */
 static umb_projector random_projector(uint64_t *seed, const umb_view *v)
 {
     umb_projector p;
@@ -78,7 +80,8 @@ static void check_inside(const umb_projector *p, const umb_projected *r, uint32_
     }
 }
 
-/* The bounds hold all corners and points between, and are no wider than the corners need by much. */
+/* The bounds hold all corners and points between, and are no wider than the corners need by
+ * much. */
 static bool check_box(uint64_t *seed, const umb_projector *p, const umb_aabb *b,
                       const umb_projected *r, uint32_t s, long double *excess)
 {

@@ -33,17 +33,23 @@ static umb_shape add_box_shape(umb_scene *scene, dice *d)
         }
     }
     for (int f = 0; f < 6; ++f) {
-        uint32_t x[6] = {faces[f][0], faces[f][1], faces[f][2], faces[f][0], faces[f][2], faces[f][3]};
+        uint32_t x[6] = {faces[f][0], faces[f][1], faces[f][2],
+                         faces[f][0], faces[f][2], faces[f][3]};
         memcpy(t[n], x, sizeof x);
         n += 2;
     }
     for (int i = 0; i < 12; ++i) { /* a few windows, a sheet or two, a flat triangle */
-        flags[i] = dice_roll(d, 12) == 0 ? UMB_TRIANGLE_OPEN : dice_roll(d, 8) == 0 ? UMB_TRIANGLE_TWO_SIDED : 0;
+        flags[i] = dice_roll(d, 12) == 0  ? UMB_TRIANGLE_OPEN
+                   : dice_roll(d, 8) == 0 ? UMB_TRIANGLE_TWO_SIDED
+                                          : 0;
     }
     if (dice_roll(d, 3) == 0) {
         t[11][2] = t[11][1];
     }
-    umb_shape_def def = {.positions = p[0], .position_count = 8, .indices = t[0], .index_count = 36,
+    umb_shape_def def = {.positions = p[0],
+                         .position_count = 8,
+                         .indices = t[0],
+                         .index_count = 36,
                          .triangle_flags = flags};
     umb_shape shape = 0;
     assert_int_equal(umb_scene_add_shape(scene, &def, &shape), UMB_OK);
@@ -55,7 +61,8 @@ static umb_transform random_place(dice *d, float reach, bool whole)
     umb_transform t = {{{0}}};
     for (int k = 0; k < 3; ++k) {
         t.m[k][k] = 1.0f + (float)dice_roll(d, 3);
-        t.m[k][3] = whole ? (float)dice_roll(d, (uint32_t)reach) : (float)dice_roll(d, 1000) * reach / 1000.0f;
+        t.m[k][3] = whole ? (float)dice_roll(d, (uint32_t)reach)
+                          : (float)dice_roll(d, 1000) * reach / 1000.0f;
         t.m[k][(k + 1) % 3] = whole ? 0.0f : (float)dice_roll(d, 100) / 100.0f;
     }
     return t;
@@ -78,7 +85,8 @@ static frame make_frame(dice *d, int boxes, umb_method method, umb_index_kind ki
     uint32_t id;
     for (int i = 0; i < boxes; ++i) {
         bool fixed = dice_roll(d, 3) != 0;
-        umb_object_def def = {.shape = shapes[dice_roll(d, 4)], .transform = random_place(d, 30.0f, fixed),
+        umb_object_def def = {.shape = shapes[dice_roll(d, 4)],
+                              .transform = random_place(d, 30.0f, fixed),
                               .flags = fixed ? UMB_OBJECT_STATIC : 0};
         def.flags |= dice_roll(d, 2) != 0 ? UMB_OBJECT_IS_SHAPE : 0;
         if (def.shape == 0) {
@@ -92,12 +100,14 @@ static frame make_frame(dice *d, int boxes, umb_method method, umb_index_kind ki
     }
     for (int i = 0; i < 3; ++i) {
         umb_transform t = random_place(d, 30.0f, false);
-        assert_int_equal(umb_scene_add_occluder(f.scene, shapes[1 + dice_roll(d, 3)], &t, &id), UMB_OK);
+        assert_int_equal(umb_scene_add_occluder(f.scene, shapes[1 + dice_roll(d, 3)], &t, &id),
+                         UMB_OK);
     }
     umb_weld_def weld = {.cluster_triangles = 40};
     assert_int_equal(umb_scene_weld(f.scene, &weld, NULL), UMB_OK);
     assert_int_equal(umb_scene_remove_object(f.scene, (uint32_t)boxes / 2), UMB_OK);
-    assert_int_equal(umb_scene_flag_object(f.scene, (uint32_t)boxes / 3, UMB_OBJECT_IGNORED), UMB_OK);
+    assert_int_equal(umb_scene_flag_object(f.scene, (uint32_t)boxes / 3, UMB_OBJECT_IGNORED),
+                     UMB_OK);
     assert_int_equal(umb_scene_commit(f.scene), UMB_OK);
     umb_index_def index_def = {.kind = kind};
     assert_int_equal(umb_index_create(f.scene, &index_def, &f.index), UMB_OK);
@@ -279,7 +289,8 @@ static void test_damage(void **state)
         uint8_t *part = malloc(cut + 1);
         assert_non_null(part);
         memcpy(part, bytes, cut);
-        assert_int_equal(umb_capture_load(part, cut, UMB_ISA_AUTO, none, &c, &error), UMB_ERROR_FORMAT);
+        assert_int_equal(umb_capture_load(part, cut, UMB_ISA_AUTO, none, &c, &error),
+                         UMB_ERROR_FORMAT);
         free(part);
     }
     assert_int_equal(umb_capture_load(NULL, 0, UMB_ISA_AUTO, none, &c, &error), UMB_ERROR_FORMAT);
@@ -360,8 +371,12 @@ static void test_checksum(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_checksum), cmocka_unit_test(test_round_trip), cmocka_unit_test(test_nothing_to_save),
-        cmocka_unit_test(test_damage), cmocka_unit_test(test_isa), cmocka_unit_test(test_failing_memory),
+        cmocka_unit_test(test_checksum),
+        cmocka_unit_test(test_round_trip),
+        cmocka_unit_test(test_nothing_to_save),
+        cmocka_unit_test(test_damage),
+        cmocka_unit_test(test_isa),
+        cmocka_unit_test(test_failing_memory),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

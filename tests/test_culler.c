@@ -1,5 +1,6 @@
-/* The culler's contract: steady frames allocate nothing, failing allocations do no harm, the order of the
- * visible set, indices and instruction sets agree, impossible views are refused, cullers share a scene. */
+/* The culler's contract: steady frames allocate nothing, failing allocations do no harm, the order
+ * of the visible set, indices and instruction sets agree, impossible views are refused, cullers
+ * share a scene. */
 #include <math.h>
 #include <pthread.h>
 #include <setjmp.h>
@@ -261,8 +262,8 @@ static uint32_t *sorted_ids(const umb_visible_set *seen)
     return ids;
 }
 
-/* One view by both indices and both methods: the frustum's answers are equal and hold the raster's, and
- * the oracle agrees with all of them. */
+/* One view by both indices and both methods: the frustum's answers are equal and hold the raster's,
+ * and the oracle agrees with all of them. */
 static void check_indices(const micro_scene *micro, umb_scene *scene, truth *oracle,
                           const umb_view *view, strict_count *sum)
 {

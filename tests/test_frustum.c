@@ -26,8 +26,8 @@ static uint32_t all_kernels(const umb_box_kernels *out[MAX_KERNELS])
     return n;
 }
 
-/* g of each plane as view.h defines it, not normalised, at the box's corner farthest along the normal
- * (most) and at the opposite one (least), and a bound of what long double loses. */
+/* g of each plane as view.h defines it, not normalised, at the box's corner farthest along the
+ * normal (most) and at the opposite one (least), and a bound of what long double loses. */
 typedef struct reference {
     long double most, least, size, length;
 } reference;
@@ -150,8 +150,8 @@ static void test_random(void **state)
     assert_true(t.inside > boxes_tested / 100);
 }
 
-/* A point of a plane, as exactly as floats allow, becomes the corner nearest to the frustum; then the
- * box is moved by a few units in the last place. */
+/* A point of a plane, as exactly as floats allow, becomes the corner nearest to the frustum; then
+ * the box is moved by a few units in the last place. */
 static void touch(uint64_t *seed, const umb_view *v, umb_aabb *b)
 {
     double depth = v->near_depth + fabs(v->near_depth) * random_in(seed, 0.0, 3.0);
@@ -193,8 +193,8 @@ static void test_touching(void **state)
     assert_true(t.unsure > 10000);
 }
 
-/* Each plane by itself, where single terms of the bound matter most: boxes a few floats from an eye that
- * is far from the origin and between floats; and planes of any offset, touched. */
+/* Each plane by itself, where single terms of the bound matter most: boxes a few floats from an eye
+ * that is far from the origin and between floats; and planes of any offset, touched. */
 static void test_each_plane(void **state)
 {
     (void)state;
@@ -246,8 +246,9 @@ static void test_each_plane(void **state)
     assert_true(outside > 100000 && dropped > 100000);
 }
 
-/* Exactly representable: an eye at whole numbers looking along an axis, slopes 1. Touching faces, edges
- * and corners are inside, one unit in the last place further is outside or unsure, never wrong. */
+/* Exactly representable: an eye at whole numbers looking along an axis, slopes 1. Touching faces,
+ * edges and corners are inside, one unit in the last place further is outside or unsure, never
+ * wrong. */
 static void test_exact_touch(void **state)
 {
     (void)state;

@@ -69,7 +69,8 @@ static void check_triangles(const soup *s, const umb_mesh *m)
         assert_true(n < m->triangle_count);
         for (int k = 0; k < 3; ++k) {
             assert_true(m->triangles[n][k] < m->block_position_count);
-            assert_true(same_position(m->positions[m->triangles[n][k]], s->positions[s->indices[t][k]]));
+            assert_true(
+                same_position(m->positions[m->triangles[n][k]], s->positions[s->indices[t][k]]));
         }
         assert_int_equal(m->two_sided[n], (s->flags[t] & UMB_TRIANGLE_TWO_SIDED) != 0);
         n += 1;
@@ -116,8 +117,8 @@ static void check_edges(const umb_mesh *m, dice *d)
     }
 }
 
-/* Every half-edge is in one entry, f0 and f1 run as documented, entries of an edge are in a row, and
- * no two single entries of one edge could have been a pair. */
+/* Every half-edge is in one entry, f0 and f1 run as documented, entries of an edge are in a row,
+ * and no two single entries of one edge could have been a pair. */
 static void check_pairs(const umb_mesh *m)
 {
     static uint8_t seen[MOST_POSITIONS][MOST_POSITIONS];
@@ -128,12 +129,14 @@ static void check_pairs(const umb_mesh *m)
         halves += e.f1 == UMB_NONE ? 1 : 2;
         bool forward = false;
         for (int k = 0; k < 3; ++k) {
-            forward = forward || (m->triangles[e.f0][k] == e.v0 && m->triangles[e.f0][(k + 1) % 3] == e.v1);
+            forward = forward ||
+                      (m->triangles[e.f0][k] == e.v0 && m->triangles[e.f0][(k + 1) % 3] == e.v1);
         }
         assert_true(forward);
         uint32_t low = e.v0 < e.v1 ? e.v0 : e.v1, high = e.v0 < e.v1 ? e.v1 : e.v0;
         const umb_edge *p = i > 0 ? &m->edges[i - 1] : NULL;
-        bool follows = p != NULL && ((p->v0 == low && p->v1 == high) || (p->v0 == high && p->v1 == low));
+        bool follows = p != NULL &&
+                       ((p->v0 == low && p->v1 == high) || (p->v0 == high && p->v1 == low));
         assert_true(follows || !seen[low][high]);
         seen[low][high] = 1;
         if (follows && e.f1 == UMB_NONE && p->f1 == UMB_NONE) {
@@ -153,7 +156,8 @@ static bool box_holds(const umb_aabb *b, const float *p)
     return true;
 }
 
-/* The walk reaches every part, children lie inside their parents, and leaves hold every triangle. */
+/* The walk reaches every part, children lie inside their parents, and leaves hold every
+ * triangle. */
 static void check_parts(const soup *s, const umb_mesh *m)
 {
     uint32_t n = s->def.index_count / 3;
@@ -164,7 +168,8 @@ static void check_parts(const soup *s, const umb_mesh *m)
         assert_true(p->skip > i && p->skip <= m->part_count);
         for (uint32_t k = i + 1; k < p->skip; ++k) {
             assert_true(m->parts[k].skip <= p->skip);
-            assert_true(box_holds(&p->box, m->parts[k].box.min) && box_holds(&p->box, m->parts[k].box.max));
+            assert_true(box_holds(&p->box, m->parts[k].box.min) &&
+                        box_holds(&p->box, m->parts[k].box.max));
         }
     }
     for (uint32_t t = 0; t < n; ++t) {
@@ -200,23 +205,24 @@ static void test_random(void **state)
     }
 }
 
-/* Two solids meet at an edge, where the lid of each lies turned over on the lid of the other: the lids
- * are not each other's partners. */
+/* Two solids meet at an edge, where the lid of each lies turned over on the lid of the other: the
+ * lids are not each other's partners. */
 static void test_pairs_keep_solids_together(void **state)
 {
     (void)state;
     static const float p[5][3] = {{0, 0, 0}, {0, 0, 1}, {1, 0, 0}, {-1, 0, 0}, {0, 1, 0}};
     static const uint32_t triangles[4][3] = {{0, 1, 4}, {1, 0, 2}, {1, 0, 4}, {0, 1, 3}};
     static const uint32_t third[4] = {4, 2, 4, 3};
-    umb_shape_def def = {.positions = p[0], .position_count = 5, .indices = triangles[0], .index_count = 12};
+    umb_shape_def def = {
+        .positions = p[0], .position_count = 5, .indices = triangles[0], .index_count = 12};
     umb_allocator a = umb_memory_allocator(NULL);
     umb_mesh *m = NULL;
     assert_int_equal(umb_mesh_create(&a, &def, &m), UMB_OK);
     uint32_t at_the_edge = 0;
     for (uint32_t i = 0; i < m->edge_count; ++i) {
         umb_edge e = m->edges[i];
-        if (m->positions[e.v0][0] == 0.0f && m->positions[e.v1][0] == 0.0f && m->positions[e.v0][1] == 0.0f &&
-            m->positions[e.v1][1] == 0.0f) {
+        if (m->positions[e.v0][0] == 0.0f && m->positions[e.v1][0] == 0.0f &&
+            m->positions[e.v0][1] == 0.0f && m->positions[e.v1][1] == 0.0f) {
             at_the_edge += 1;
             assert_true(e.f1 != UMB_NONE && third[e.f0] != third[e.f1]);
         }
@@ -254,7 +260,8 @@ static void test_bad_definitions(void **state)
     (void)state;
     float p[4][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
     uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
-    umb_shape_def good = {.positions = p[0], .position_count = 4, .indices = indices, .index_count = 6};
+    umb_shape_def good = {
+        .positions = p[0], .position_count = 4, .indices = indices, .index_count = 6};
     umb_allocator a = umb_memory_allocator(NULL);
     umb_mesh *m = NULL;
     assert_int_equal(umb_mesh_create(&a, NULL, &m), UMB_ERROR_ARGUMENT);
@@ -282,7 +289,8 @@ static void test_bad_definitions(void **state)
     def = good;
     def.index_count = 0;
     def.indices = NULL;
-    assert_int_equal(umb_mesh_create(&a, &def, &m), UMB_OK); /* points alone: bounds and nothing else */
+    assert_int_equal(umb_mesh_create(&a, &def, &m),
+                     UMB_OK); /* points alone: bounds and nothing else */
     assert_int_equal(m->triangle_count, 0);
     assert_int_equal(m->part_count, 1);
     assert_true(m->bounds.max[2] == 1.0f && m->bounds.min[0] == 0.0f);
@@ -294,7 +302,10 @@ static void test_stride(void **state)
     (void)state;
     float p[3][5] = {{0, 0, 0, 9, 9}, {1, 0, 0, 9, 9}, {0, 1, 0, 9, 9}};
     uint32_t indices[3] = {0, 1, 2};
-    umb_shape_def def = {.positions = p[0], .position_count = 3, .position_stride = 20, .indices = indices,
+    umb_shape_def def = {.positions = p[0],
+                         .position_count = 3,
+                         .position_stride = 20,
+                         .indices = indices,
                          .index_count = 3};
     umb_allocator a = umb_memory_allocator(NULL);
     umb_mesh *m = NULL;
@@ -365,9 +376,13 @@ static void test_failing_memory(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_random), cmocka_unit_test(test_pairs_keep_solids_together),
-        cmocka_unit_test(test_fan), cmocka_unit_test(test_bad_definitions), cmocka_unit_test(test_stride),
-        cmocka_unit_test(test_world_bounds), cmocka_unit_test(test_failing_memory),
+        cmocka_unit_test(test_random),
+        cmocka_unit_test(test_pairs_keep_solids_together),
+        cmocka_unit_test(test_fan),
+        cmocka_unit_test(test_bad_definitions),
+        cmocka_unit_test(test_stride),
+        cmocka_unit_test(test_world_bounds),
+        cmocka_unit_test(test_failing_memory),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

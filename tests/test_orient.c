@@ -106,8 +106,8 @@ static void test_unlike_sizes(void **state)
     }
 }
 
-/* Far from the origin the differences are short though the points are not; next to it a point may be less
- * than any rounding. */
+/* Far from the origin the differences are short though the points are not; next to it a point may
+ * be less than any rounding. */
 static void test_least_steps(void **state)
 {
     (void)state;

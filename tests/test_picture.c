@@ -214,7 +214,8 @@ static void test_occlusion(void **state)
     tear_down(s);
 }
 
-/* Depths come back out of the buffer: the wall's front is 5 ahead, and bounds lie at or behind it. */
+/* Depths come back out of the buffer: the wall's front is 5 ahead, and bounds lie at or behind
+ * it. */
 static void test_depths(void **state)
 {
     (void)state;

@@ -1,7 +1,7 @@
-/* The oracle catches a culler that lies. The library is handed a scene with a planted mistake - objects
- * smaller by one hundredth than what is drawn, or occluders larger by as much - while the oracle keeps the
- * true model: it must prove, by confirmed sight-lines, that something visible was hidden. The same scene
- * without the mistake must pass. */
+/* The oracle catches a culler that lies. The library is handed a scene with a planted mistake -
+ * objects smaller by one hundredth than what is drawn, or occluders larger by as much - while the
+ * oracle keeps the true model: it must prove, by confirmed sight-lines, that something visible was
+ * hidden. The same scene without the mistake must pass. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -43,8 +43,8 @@ static void add(umb_scene *scene, umb_shape shape, const model_object *o, double
     assert_int_equal(id, expected);
 }
 
-/* Each object of the model twice: numbered as in the model what is tested and never hides, after those
- * what hides. Either can have its mistake. */
+/* Each object of the model twice: numbered as in the model what is tested and never hides, after
+ * those what hides. Either can have its mistake. */
 static umb_scene *planted_scene(const model *m, plant what, bool weld)
 {
     umb_scene *scene = NULL;

@@ -1,5 +1,5 @@
-/* The buffer's invariant, by brute force: every point of a covered pixel is blocked by a triangle of an
- * occluder, beyond the near depth, nearer than the bound of its sub-tile. */
+/* The buffer's invariant, by brute force: every point of a covered pixel is blocked by a triangle
+ * of an occluder, beyond the near depth, nearer than the bound of its sub-tile. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -40,8 +40,8 @@ static point from_vec(umb_vec3 v)
     return p;
 }
 
-/* View depth at which the line from, along, meets the front of a triangle; false if it does not. along
- * gains 1 of view depth per unit. */
+/* View depth at which the line from, along, meets the front of a triangle; false if it does not.
+ * along gains 1 of view depth per unit. */
 static bool meets(point from, point along, const point t[3], bool two_sided, long double *depth)
 {
     point n = cross(minus(t[1], t[0]), minus(t[2], t[0]));
@@ -62,9 +62,11 @@ static bool meets(point from, point along, const point t[3], bool two_sided, lon
 }
 
 /* Nearest blocking depth beyond near along the line through a raster point; INFINITY if none. */
-static long double blocked_at(const umb_raster_map *map, const model *m, long double px, long double py)
+static long double blocked_at(const umb_raster_map *map, const model *m, long double px,
+                              long double py)
 {
-    point along, from = from_vec(map->eye), ray_x = from_vec(map->ray_x), ray_y = from_vec(map->ray_y);
+    point along, from = from_vec(map->eye), ray_x = from_vec(map->ray_x),
+                 ray_y = from_vec(map->ray_y);
     point ray = from_vec(map->ray_0);
     ray.x += px * ray_x.x + py * ray_y.x;
     ray.y += px * ray_x.y + py * ray_y.y;
@@ -105,7 +107,8 @@ static double unit(uint64_t *state)
     return (double)(*state >> 11) * 0x1p-53;
 }
 
-static uint64_t check_buffer(const umb_raster_map *map, const umb_coverage *b, const model *m, uint64_t seed)
+static uint64_t check_buffer(const umb_raster_map *map, const umb_coverage *b, const model *m,
+                             uint64_t seed)
 {
     uint64_t covered = 0;
     for (uint32_t y = 0; y < map->height; ++y) {
@@ -122,7 +125,8 @@ static uint64_t check_buffer(const umb_raster_map *map, const umb_coverage *b, c
             long double z = t->z[4 * (y % 8 / 4) + x % 32 / 8];
             bool ok = map->orthographic ? -depth > z : 1.0L / depth > z;
             if (depth == INFINITY || !ok) {
-                fail_msg("seed %llu pixel %u,%u: depth %Lg, bound %Lg", (unsigned long long)seed, x, y, depth, z);
+                fail_msg("seed %llu pixel %u,%u: depth %Lg, bound %Lg", (unsigned long long)seed, x,
+                         y, depth, z);
             }
         }
     }

@@ -286,7 +286,8 @@ static void test_random_changes(void **state)
             umb_transform t = shifted(x, 0, 0);
             if (what == 0 && umb_scene_object_count(scene) < MOST) {
                 bool hides = dice_roll(&d, 3) != 0;
-                umb_object_def def = {.shape = shape, .transform = t, .flags = hides ? 0 : UMB_OBJECT_NEVER_HIDES};
+                umb_object_def def = {
+                    .shape = shape, .transform = t, .flags = hides ? 0 : UMB_OBJECT_NEVER_HIDES};
                 assert_int_equal(umb_scene_add_object(scene, &def, &id), UMB_OK);
                 assert_true(id < MOST && !model[id].used);
                 model[id].used = true;
@@ -377,9 +378,12 @@ static void test_failing_memory(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_ids), cmocka_unit_test(test_commit_shows_changes),
-        cmocka_unit_test(test_removed_ids), cmocka_unit_test(test_bad_input),
-        cmocka_unit_test(test_listeners), cmocka_unit_test(test_random_changes),
+        cmocka_unit_test(test_ids),
+        cmocka_unit_test(test_commit_shows_changes),
+        cmocka_unit_test(test_removed_ids),
+        cmocka_unit_test(test_bad_input),
+        cmocka_unit_test(test_listeners),
+        cmocka_unit_test(test_random_changes),
         cmocka_unit_test(test_failing_memory),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,7 +1,9 @@
-/* Nothing that can be seen is hidden, on the real scenes of UMBRAGE_SCENES; and levels are really culled.
+/* Nothing that can be seen is hidden, on the real scenes of UMBRAGE_SCENES; and levels are really
+ * culled.
  *
- * test_scenes [PART PARTS]: takes every PARTS-th scene from PART on, so that parts run side by side. A third
- * argument takes only the scenes whose name contains it. UMBRAGE_TEST_SIZE chooses the views. */
+ * test_scenes [PART PARTS]: takes every PARTS-th scene from PART on, so that parts run side by
+ * side. A third argument takes only the scenes whose name contains it. UMBRAGE_TEST_SIZE chooses
+ * the views. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -131,7 +133,8 @@ static void say(const stand *s, uint32_t raster, const char *views, const strict
     (void)fflush(stdout);
 }
 
-/* Returns how many objects were wrongly hidden, plus one for each level that is not really culled. */
+/* Returns how many objects were wrongly hidden, plus one for each level that is not really
+ * culled. */
 static uint64_t check_scene(const real_scene *scene, const effort *e)
 {
     stand s = {.scene = scene, .effort = e};

@@ -1,5 +1,5 @@
-/* Nothing that can be seen is hidden: adversarial micro-scenes under three raster sizes, both indices,
- * against the oracle. UMBRAGE_MICRO_SCENES sets how many (500; small 60; full 10,000). */
+/* Nothing that can be seen is hidden: adversarial micro-scenes under three raster sizes, both
+ * indices, against the oracle. UMBRAGE_MICRO_SCENES sets how many (500; small 60; full 10,000). */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdio.h>

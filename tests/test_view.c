@@ -1,4 +1,5 @@
-/* Views: recovered from matrices of every convention, planes against projected points, refused input. */
+/* Views: recovered from matrices of every convention, planes against projected points, refused
+ * input. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

@@ -42,7 +42,8 @@ static soup take_soup(const umb_scene *scene)
         for (uint32_t t = 0; t < o->mesh->triangle_count; ++t, ++n) {
             for (int k = 0; k < 3; ++k) {
                 float *out = s.corners[n][o->mirrored && k > 0 ? 3 - k : k];
-                umb_transform_point(&o->transform, o->mesh->positions[o->mesh->triangles[t][k]], out);
+                umb_transform_point(&o->transform, o->mesh->positions[o->mesh->triangles[t][k]],
+                                    out);
             }
             s.two_sided[n] = o->mesh->two_sided[t];
         }
@@ -56,8 +57,8 @@ static void free_soup(soup *s)
     free(s->two_sided);
 }
 
-/* Distances at which a line from p along d is blocked, ascending, equal ones once. False when the line
- * passes an edge too closely to tell. */
+/* Distances at which a line from p along d is blocked, ascending, equal ones once. False when the
+ * line passes an edge too closely to tell. */
 static bool cast(const soup *s, umb_vec3 p, umb_vec3 d, double *hits, uint32_t *count)
 {
     *count = 0;
@@ -117,9 +118,10 @@ static bool cast(const soup *s, umb_vec3 p, umb_vec3 d, double *hits, uint32_t *
 
 enum { ALL_SAME = 1, FIRST_SAME = 2 };
 
-/* Every hit after is a hit before; ALL_SAME: and the other way round; FIRST_SAME: the first hits of lines
- * that start where sure says that no solid is are the same. */
-static void compare_soups(const soup *before, const soup *after, dice *d, int how, int lines, double reach)
+/* Every hit after is a hit before; ALL_SAME: and the other way round; FIRST_SAME: the first hits of
+ * lines that start where sure says that no solid is are the same. */
+static void compare_soups(const soup *before, const soup *after, dice *d, int how, int lines,
+                          double reach)
 {
     static double a[MOST_HITS], b[MOST_HITS];
     int done = 0;
@@ -162,13 +164,16 @@ static umb_scene *make_scene(void)
     return scene;
 }
 
-static uint32_t add(umb_scene *scene, const float (*p)[3], uint32_t n, const uint32_t (*t)[3], uint32_t count,
-                    uint8_t flag, const umb_transform *transform)
+static uint32_t add(umb_scene *scene, const float (*p)[3], uint32_t n, const uint32_t (*t)[3],
+                    uint32_t count, uint8_t flag, const umb_transform *transform)
 {
     uint8_t flags[64];
     memset(flags, flag, sizeof flags);
     umb_shape shape = 0;
-    umb_shape_def def = {.positions = p[0], .position_count = n, .indices = t[0], .index_count = 3 * count,
+    umb_shape_def def = {.positions = p[0],
+                         .position_count = n,
+                         .indices = t[0],
+                         .index_count = 3 * count,
                          .triangle_flags = flags};
     assert_true(count <= 64);
     assert_int_equal(umb_scene_add_shape(scene, &def, &shape), UMB_OK);
@@ -231,8 +236,8 @@ static void assert_closed_box(const umb_scene *scene, uint32_t triangles)
     }
 }
 
-/* A solid block of boxes, each face cut at random: one closed shell is left, of outer faces only, and these
- * are flat. */
+/* A solid block of boxes, each face cut at random: one closed shell is left, of outer faces only,
+ * and these are flat. */
 static void test_stack_becomes_a_box(void **state)
 {
     (void)state;
@@ -246,7 +251,8 @@ static void test_stack_becomes_a_box(void **state)
         size[0] += size[0] * size[1] * size[2] == 1 ? 1 : 0;
         uint32_t boxes = 0;
         for (int i = 0; i < size[0] * size[1] * size[2]; ++i) {
-            float lo[3] = {(float)(i % size[0]), (float)(i / size[0] % size[1]), (float)(i / size[0] / size[1])};
+            float lo[3] = {(float)(i % size[0]), (float)(i / size[0] % size[1]),
+                           (float)(i / size[0] / size[1])};
             float hi[3] = {lo[0] + 1, lo[1] + 1, lo[2] + 1};
             (void)add_box(scene, lo, hi, dice_roll(&d, 64));
             boxes += 1;
@@ -258,7 +264,8 @@ static void test_stack_becomes_a_box(void **state)
         assert_int_equal(stats.groups, 1);
         assert_int_equal(stats.objects, boxes);
         assert_int_equal(stats.triangles_out, 12);
-        assert_int_equal(stats.merged, outer / 2 + 2 - 8); /* Euler's: 2 vertices more than half the triangles */
+        assert_int_equal(stats.merged,
+                         outer / 2 + 2 - 8); /* Euler's: 2 vertices more than half the triangles */
         assert_int_equal(stats.sealed, 12 * boxes - outer);
         assert_closed_box(scene, 12);
         soup after = take_soup(scene);
@@ -269,10 +276,10 @@ static void test_stack_becomes_a_box(void **state)
     }
 }
 
-/* One floor of a building: walls under and over the plan (corners counter-clockwise seen from +z), and both
- * ends; flats are the triangles of the plan. */
-static void add_floor(umb_scene *scene, dice *d, const float (*plan)[2], uint32_t n, const uint32_t (*flats)[3],
-                      float low, float high)
+/* One floor of a building: walls under and over the plan (corners counter-clockwise seen from +z),
+ * and both ends; flats are the triangles of the plan. */
+static void add_floor(umb_scene *scene, dice *d, const float (*plan)[2], uint32_t n,
+                      const uint32_t (*flats)[3], float low, float high)
 {
     float p[16][3];
     uint32_t t[32][3], count = 0;
@@ -282,7 +289,8 @@ static void add_floor(umb_scene *scene, dice *d, const float (*plan)[2], uint32_
             p[2 * i + k][1] = plan[i][1];
             p[2 * i + k][2] = k ? high : low;
         }
-        uint32_t q[4] = {2 * i, 2 * ((i + 1) % n), 2 * ((i + 1) % n) + 1, 2 * i + 1}, s = dice_roll(d, 2);
+        uint32_t q[4] = {2 * i, 2 * ((i + 1) % n), 2 * ((i + 1) % n) + 1, 2 * i + 1},
+                 s = dice_roll(d, 2);
         uint32_t x[6] = {q[s], q[s + 1], q[(s + 2) % 4], q[s], q[(s + 2) % 4], q[(s + 3) % 4]};
         memcpy(t[count], x, sizeof x);
         count += 2;
@@ -297,8 +305,8 @@ static void add_floor(umb_scene *scene, dice *d, const float (*plan)[2], uint32_
     (void)add(scene, (const float(*)[3])p, 2 * n, (const uint32_t(*)[3])t, count, 0, NULL);
 }
 
-/* Floors of one plan, turned so that nothing but up is along an axis: a wall is two triangles, however many
- * floors there are. */
+/* Floors of one plan, turned so that nothing but up is along an axis: a wall is two triangles,
+ * however many floors there are. */
 static void test_floors_become_a_building(void **state)
 {
     (void)state;
@@ -319,7 +327,8 @@ static void test_floors_become_a_building(void **state)
         }
         for (uint32_t f = 0; f < floors; ++f) {
             float high = z + 0.3f + (float)dice_roll(&d, 7) * 0.1f;
-            add_floor(scene, &d, (const float(*)[2])plan, n, n == 6 ? bent_flats : box_flats, z, high);
+            add_floor(scene, &d, (const float(*)[2])plan, n, n == 6 ? bent_flats : box_flats, z,
+                      high);
             z = high;
         }
         assert_int_equal(umb_scene_commit(scene), UMB_OK);
@@ -355,8 +364,9 @@ static void drop_repeated(soup *s)
     s->count = n;
 }
 
-/* How often a point of the grid's plane is covered, by one-sided (0) and by two-sided (1) triangles. All
- * numbers are small integers over 4096: nothing is rounded. Triangles turn one way. */
+/* How often a point of the grid's plane is covered, by one-sided (0) and by two-sided (1)
+ * triangles. All numbers are small integers over 4096: nothing is rounded. Triangles turn one
+ * way. */
 static void count_cover(const soup *s, double x, double y, int cover[2])
 {
     cover[0] = cover[1] = 0;
@@ -372,14 +382,15 @@ static void count_cover(const soup *s, double x, double y, int cover[2])
     }
 }
 
-/* The corner where cells a, b, c, d meet in turn is one of no outline, or lies on straight ones only. */
+/* The corner where cells a, b, c, d meet in turn is one of no outline, or lies on straight ones
+ * only. */
 static bool is_spare(int a, int b, int c, int d)
 {
     return (a == b && c == d) || (b == c && d == a);
 }
 
-/* A flat grid with holes and two-sided cells in a slanted plane: each point of it is covered as before and
- * once, and what vertices stay are the corners of the outlines. */
+/* A flat grid with holes and two-sided cells in a slanted plane: each point of it is covered as
+ * before and once, and what vertices stay are the corners of the outlines. */
 static void test_flat_grids(void **state)
 {
     (void)state;
@@ -401,13 +412,15 @@ static void test_flat_grids(void **state)
                     q[k][2] = (float)(slope * q[k][0] - lean * q[k][1]);
                 }
                 if (cells[i][j] != 0) {
-                    add_quad(scene, (const float(*)[3])q, cells[i][j] == 2 ? UMB_TRIANGLE_TWO_SIDED : 0);
+                    add_quad(scene, (const float(*)[3])q,
+                             cells[i][j] == 2 ? UMB_TRIANGLE_TWO_SIDED : 0);
                 }
             }
         }
         for (int i = 0; i <= GRID; ++i) {
             for (int j = 0; j <= GRID; ++j) {
-                int a = cells[i][j], b = cells[i + 1][j], c = cells[i + 1][j + 1], e = cells[i][j + 1];
+                int a = cells[i][j], b = cells[i + 1][j], c = cells[i + 1][j + 1],
+                    e = cells[i][j + 1];
                 bool any = a + b + c + e > 0;
                 spare += any && is_spare(a, b, c, e) ? 1 : 0;
             }
@@ -422,8 +435,8 @@ static void test_flat_grids(void **state)
             for (int j = 0; j <= GRID + 1; ++j) {
                 for (int k = 0; k < 4; ++k) {
                     int cover[2];
-                    count_cover(&after, i + (k % 2 ? 2903 : 947) / 4096.0, j + (k / 2 ? 2749 : 1531) / 4096.0,
-                                cover);
+                    count_cover(&after, i + (k % 2 ? 2903 : 947) / 4096.0,
+                                j + (k / 2 ? 2749 : 1531) / 4096.0, cover);
                     assert_int_equal(cover[0], cells[i][j] == 1);
                     assert_int_equal(cover[1], cells[i][j] == 2);
                 }
@@ -448,8 +461,8 @@ static bool uses_point(const umb_scene *scene, float x, float y, float z)
     return found;
 }
 
-/* Four squares around (1, 1, 0). What else is at that point speaks against taking it out, unless it is
- * flat too; so does one bit of height. */
+/* Four squares around (1, 1, 0). What else is at that point speaks against taking it out, unless it
+ * is flat too; so does one bit of height. */
 static void test_what_touches_stays(void **state)
 {
     (void)state;
@@ -498,7 +511,8 @@ static void test_what_touches_stays(void **state)
     }
 }
 
-/* Random boxes and sheets on a lattice, touching, overlapping, repeated, turned over, with T-junctions. */
+/* Random boxes and sheets on a lattice, touching, overlapping, repeated, turned over, with
+ * T-junctions. */
 static void make_mess(umb_scene *scene, dice *d, int boxes, int sheets)
 {
     for (int i = 0; i < boxes; ++i) {
@@ -516,7 +530,8 @@ static void make_mess(umb_scene *scene, dice *d, int boxes, int sheets)
             lo[k] = (float)dice_roll(d, 6);
             hi[k] = lo[k] + 1.0f + (float)dice_roll(d, 3);
         }
-        float lean = dice_roll(d, 2) ? (float)dice_roll(d, 3) : 0.0f; /* slanted: edges along no axis */
+        float lean = dice_roll(d, 2) ? (float)dice_roll(d, 3)
+                                     : 0.0f; /* slanted: edges along no axis */
         for (int c = 0; c < 4; ++c) {
             q[c][u] = c == 1 || c == 2 ? hi[u] : lo[u];
             q[c][v] = c >= 2 ? hi[v] : lo[v];
@@ -539,7 +554,8 @@ static void test_mess_blocks_the_same(void **state)
     umb_weld_stats sum = {0};
     for (int round = 0; round < 150; ++round) {
         umb_scene *scene = make_scene();
-        make_mess(scene, &d, round % 3 == 0 ? 0 : 2 + (int)dice_roll(&d, 12), 2 + (int)dice_roll(&d, 20));
+        make_mess(scene, &d, round % 3 == 0 ? 0 : 2 + (int)dice_roll(&d, 12),
+                  2 + (int)dice_roll(&d, 20));
         assert_int_equal(umb_scene_commit(scene), UMB_OK);
         soup before = take_soup(scene);
         umb_weld_stats stats = weld(scene, 8 + dice_roll(&d, 60));
@@ -596,16 +612,17 @@ static double open_length(const umb_scene *scene)
         for (uint32_t e = 0; e < m->edge_count; ++e) {
             if (m->edges[e].f1 == UMB_NONE) {
                 umb_vec3 u = umb_vec3_from_float(m->positions[m->edges[e].v0]);
-                sum += umb_vec3_length(umb_vec3_sub(umb_vec3_from_float(m->positions[m->edges[e].v1]), u));
+                sum += umb_vec3_length(
+                    umb_vec3_sub(umb_vec3_from_float(m->positions[m->edges[e].v1]), u));
             }
         }
     }
     return sum;
 }
 
-/* A wide sheet above many narrow ones: one surface with nothing open but its rim. Along an axis, and
- * slanted; the ends in the middle of the row lie on the wide sheet's edge alone. Flat, the sheets are one in
- * the end; folded, every end stays. */
+/* A wide sheet above many narrow ones: one surface with nothing open but its rim. Along an axis,
+ * and slanted; the ends in the middle of the row lie on the wide sheet's edge alone. Flat, the
+ * sheets are one in the end; folded, every end stays. */
 static void test_t_junctions(void **state)
 {
     (void)state;
@@ -637,8 +654,8 @@ static void test_t_junctions(void **state)
     }
 }
 
-/* A wall without thickness, made of two sheets back to back: in the open, and across a closed room. It
- * must go on to block from both sides. */
+/* A wall without thickness, made of two sheets back to back: in the open, and across a closed room.
+ * It must go on to block from both sides. */
 static void test_thin_walls_stay(void **state)
 {
     (void)state;
@@ -687,9 +704,11 @@ static uint64_t hash_scene(const umb_scene *scene)
     uint64_t h = 14695981039346656037u;
     for (uint32_t i = 0; i < c->occluder_count; ++i) {
         const umb_mesh *m = c->occluders[i].mesh;
-        const unsigned char *parts[3] = {(const unsigned char *)m->positions, (const unsigned char *)m->triangles,
+        const unsigned char *parts[3] = {(const unsigned char *)m->positions,
+                                         (const unsigned char *)m->triangles,
                                          (const unsigned char *)m->edges};
-        size_t sizes[3] = {m->position_count * sizeof *m->positions, m->triangle_count * sizeof *m->triangles,
+        size_t sizes[3] = {m->position_count * sizeof *m->positions,
+                           m->triangle_count * sizeof *m->triangles,
                            m->edge_count * sizeof *m->edges};
         for (int k = 0; k < 3; ++k) {
             for (size_t b = 0; b < sizes[k]; ++b) {
@@ -727,8 +746,8 @@ static void test_workers_change_nothing(void **state)
     printf("golden weld_mess %016llx\n", (unsigned long long)wanted);
 }
 
-/* A bumpy sheet of single quads cut into small clusters: every vertex of it is in some cluster that has
- * all the triangles around it, so no pinhole is left. */
+/* A bumpy sheet of single quads cut into small clusters: every vertex of it is in some cluster that
+ * has all the triangles around it, so no pinhole is left. */
 static void test_rings_leave_no_pinholes(void **state)
 {
     (void)state;
@@ -817,7 +836,8 @@ static void test_big_and_mirrored(void **state)
     umb_scene_destroy(scene);
 }
 
-/* Three boxes in a row, a pair apart: moving, flagging or removing one member ends its weld only. */
+/* Three boxes in a row, a pair apart: moving, flagging or removing one member ends its weld
+ * only. */
 static void test_dissolve(void **state)
 {
     (void)state;
@@ -869,7 +889,8 @@ static void test_members(void **state)
         lo[0] = (float)i;
         hi[0] = lo[0] + 1;
         uint32_t id = add_box(scene, lo, hi, 0);
-        static const uint32_t flags[4] = {UMB_OBJECT_STATIC, 0, UMB_OBJECT_STATIC | UMB_OBJECT_NEVER_HIDES,
+        static const uint32_t flags[4] = {UMB_OBJECT_STATIC, 0,
+                                          UMB_OBJECT_STATIC | UMB_OBJECT_NEVER_HIDES,
                                           UMB_OBJECT_STATIC | UMB_OBJECT_IGNORED};
         assert_int_equal(umb_scene_flag_object(scene, id, flags[i]), UMB_OK);
     }
@@ -934,12 +955,19 @@ static void test_failing_memory(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_stack_becomes_a_box), cmocka_unit_test(test_mess_blocks_the_same),
-        cmocka_unit_test(test_sealing_from_outside), cmocka_unit_test(test_t_junctions),
-        cmocka_unit_test(test_thin_walls_stay), cmocka_unit_test(test_workers_change_nothing),
-        cmocka_unit_test(test_rings_leave_no_pinholes), cmocka_unit_test(test_big_and_mirrored),
-        cmocka_unit_test(test_dissolve), cmocka_unit_test(test_members), cmocka_unit_test(test_failing_memory),
-        cmocka_unit_test(test_floors_become_a_building), cmocka_unit_test(test_flat_grids),
+        cmocka_unit_test(test_stack_becomes_a_box),
+        cmocka_unit_test(test_mess_blocks_the_same),
+        cmocka_unit_test(test_sealing_from_outside),
+        cmocka_unit_test(test_t_junctions),
+        cmocka_unit_test(test_thin_walls_stay),
+        cmocka_unit_test(test_workers_change_nothing),
+        cmocka_unit_test(test_rings_leave_no_pinholes),
+        cmocka_unit_test(test_big_and_mirrored),
+        cmocka_unit_test(test_dissolve),
+        cmocka_unit_test(test_members),
+        cmocka_unit_test(test_failing_memory),
+        cmocka_unit_test(test_floors_become_a_building),
+        cmocka_unit_test(test_flat_grids),
         cmocka_unit_test(test_what_touches_stays),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

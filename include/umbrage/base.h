@@ -29,7 +29,8 @@ extern "C" {
 /* No object, no index, no node. Ids are dense from 0; this is the one value that is never an id. */
 #define UMB_NONE UINT32_MAX
 
-/* What a call says of itself. The numbers are pinned: they may be stored and compared over versions. */
+/* What a call says of itself. The numbers are pinned: they may be stored and compared over
+ * versions. */
 typedef enum umb_result {
     UMB_OK = 0,
     UMB_ERROR_MEMORY = 1,   /* the allocator returned NULL; nothing changed */

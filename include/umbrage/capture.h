@@ -9,10 +9,10 @@
 extern "C" {
 #endif
 
-/* Write the frame that the culler answered last into bytes, if capacity allows; *size is always set to
- * the bytes needed. Pass bytes NULL, capacity 0 to ask. UMB_ERROR_STATE before the first umb_cull, and
- * when the scene has changed since;
- * UMB_ERROR_ARGUMENT when bytes is not NULL and capacity is too small (nothing is written). */
+/* Write the frame that the culler answered last into bytes, if capacity allows; *size is always set
+ * to the bytes needed. Pass bytes NULL, capacity 0 to ask. UMB_ERROR_STATE before the first
+ * umb_cull, and when the scene has changed since; UMB_ERROR_ARGUMENT when bytes is not NULL and
+ * capacity is too small (nothing is written). */
 UMB_API umb_result umb_capture_save(const umb_culler *culler, void *bytes, size_t capacity, size_t *size);
 
 /* A loaded capture: its scene, index and culler are its own, ready for umb_cull with its view. */

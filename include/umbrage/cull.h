@@ -57,17 +57,17 @@ UMB_API umb_result umb_culler_create(const umb_index *index, const umb_culler_de
 /* NULL is allowed. */
 UMB_API void umb_culler_destroy(umb_culler *culler);
 
-/* Answer one view. Allocates only when the scene or the raster has grown since the last call.
- * Safe direction: may report a hidden object visible; never the reverse, provided every object's bounds
- * contain what is drawn for it and every occluder lies inside what is drawn.
- * Threads: one call at a time for each culler. Cost: proportional to what is seen.
- * Errors: an impossible view (umb_view_check), no memory. *out is then empty. */
+/* Answer one view. Allocates only when the scene or the raster has grown since the last call. Safe
+ * direction: may report a hidden object visible; never the reverse, provided every object's bounds
+ * contain what is drawn for it and every occluder lies inside what is drawn. Threads: one call at a
+ * time for each culler. Cost: proportional to what is seen. Errors: an impossible view
+ * (umb_view_check), no memory. *out is then empty. */
 UMB_API umb_result umb_cull(umb_culler *culler, const umb_view *view, umb_visible_set *out);
 
-/* The occlusion buffer after the last umb_cull: for each pixel, row by row from the top, 1 / depth of
- * a bound that what covers it lies in front of; 0 where not covered. For orthographic views the value is
- * 1 / (1 + depth - near depth). Returns false, with the sizes only, when pixels is NULL or capacity (in
- * floats) is too small, or when the method has no buffer (sizes 0). */
+/* The occlusion buffer after the last umb_cull: for each pixel, row by row from the top, 1 / depth
+ * of a bound that what covers it lies in front of; 0 where not covered. For orthographic views the
+ * value is 1 / (1 + depth - near depth). Returns false, with the sizes only, when pixels is NULL or
+ * capacity (in floats) is too small, or when the method has no buffer (sizes 0). */
 UMB_API bool umb_culler_read_buffer(const umb_culler *culler, float *pixels, size_t capacity,
                                     uint32_t *width, uint32_t *height);
 

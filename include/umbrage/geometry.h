@@ -8,7 +8,8 @@
 extern "C" {
 #endif
 
-/* An axis-aligned box, closed: its faces belong to it. min <= max in every component, all finite. */
+/* An axis-aligned box, closed: its faces belong to it. min <= max in every component, all
+ * finite. */
 typedef struct umb_aabb {
     float min[3];
     float max[3];

@@ -1,5 +1,5 @@
-/* A spatial index over the bounds of a scene's objects and occluders. Its own thing: cullers share it.
- * (Gummerus 3.1 to 3.2: hierarchies let hidden and outside things be skipped as a whole.) */
+/* A spatial index over the bounds of a scene's objects and occluders. Its own thing: cullers share
+ * it. (Gummerus 3.1 to 3.2: hierarchies let hidden and outside things be skipped as a whole.) */
 #ifndef UMBRAGE_INDEX_H
 #define UMBRAGE_INDEX_H
 
@@ -29,8 +29,8 @@ typedef struct umb_index_stats {
     size_t bytes;
 } umb_index_stats;
 
-/* Build an index over the scene as last committed. The scene must outlive it; later commits update it:
- * moved boxes are refitted, additions and removals rebuild it. */
+/* Build an index over the scene as last committed. The scene must outlive it; later commits update
+ * it: moved boxes are refitted, additions and removals rebuild it. */
 UMB_API umb_result umb_index_create(umb_scene *scene, const umb_index_def *def, umb_index **out);
 /* NULL is allowed. Its cullers must be destroyed first. */
 UMB_API void umb_index_destroy(umb_index *index);

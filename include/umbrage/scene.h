@@ -4,9 +4,10 @@
  * scene up to date. Between commits any number of cullers may read the scene from any threads;
  * changing and committing need exclusive access.
  *
- * What hides: a triangle blocks from its front, the side from which its corners run counter-clockwise
- * (transforms that mirror are compensated), or from both sides when it is marked two-sided. What can be
- * seen: every triangle, from both sides, and everything inside an object's bounds.
+ * What hides: a triangle blocks from its front, the side from which its corners run
+ * counter-clockwise (transforms that mirror are compensated), or from both sides when it is marked
+ * two-sided. What can be seen: every triangle, from both sides, and everything inside an object's
+ * bounds.
  */
 #ifndef UMBRAGE_SCENE_H
 #define UMBRAGE_SCENE_H
@@ -70,11 +71,11 @@ UMB_API void umb_scene_destroy(umb_scene *scene);
 /* Copy a shape into the scene; builds its adjacency (which edges bound which triangles). */
 UMB_API umb_result umb_scene_add_shape(umb_scene *scene, const umb_shape_def *def, umb_shape *out);
 
-/* Add an object. Ids are dense from 0; an id freed by remove is given out again, lowest first, after
- * the next commit. */
+/* Add an object. Ids are dense from 0; an id freed by remove is given out again, lowest first,
+ * after the next commit. */
 UMB_API umb_result umb_scene_add_object(umb_scene *scene, const umb_object_def *def, uint32_t *out);
-/* Give an object a new place. transform NULL: the identity; bounds NULL: the shape's own.
- * Moving a welded object dissolves the welds it is part of: their members hide by their own shapes. */
+/* Give an object a new place. transform NULL: the identity; bounds NULL: the shape's own. Moving a
+ * welded object dissolves the welds it is part of: their members hide by their own shapes. */
 UMB_API umb_result umb_scene_move_object(umb_scene *scene, uint32_t object,
                                          const umb_transform *transform, const umb_aabb *bounds);
 /* Replace the UMB_OBJECT_* flags of an object. Dissolves welds as moving does. */
@@ -109,13 +110,14 @@ typedef struct umb_weld_stats {
                               points with fewer triangles */
 } umb_weld_stats;
 
-/* Join static objects that touch, by exactly equal vertex positions, into occluders of their own, so
- * that the seams between level faces or wall pieces are no cracks. Equal triangles are kept once,
- * triangles face to face are dropped, vertices that lie exactly on an edge split it. Then surfaces that
- * are exactly flat are made of fewer triangles, which cover the very same points. What a welded occluder
- * covers is a subset of what its objects' blocking triangles cover, plus nothing.
- * Objects that touch no other keep hiding by their own shape. Call it after the static objects are in;
- * calling it again redoes the work. Takes effect at the next commit. stats may be NULL. */
+/* Join static objects that touch, by exactly equal vertex positions, into occluders of their own,
+ * so that the seams between level faces or wall pieces are no cracks. Equal triangles are kept
+ * once, triangles face to face are dropped, vertices that lie exactly on an edge split it. Then
+ * surfaces that are exactly flat are made of fewer triangles, which cover the very same points.
+ * What a welded occluder covers is a subset of what its objects' blocking triangles cover, plus
+ * nothing. Objects that touch no other keep hiding by their own shape. Call it after the static
+ * objects are in; calling it again redoes the work. Takes effect at the next commit. stats may be
+ * NULL. */
 UMB_API umb_result umb_scene_weld(umb_scene *scene, const umb_weld_def *def, umb_weld_stats *stats);
 
 /* Make all changes visible to indices and cullers. */
@@ -125,7 +127,8 @@ UMB_API umb_result umb_scene_commit(umb_scene *scene);
 UMB_API uint32_t umb_scene_object_count(const umb_scene *scene);
 /* Bounds of an object as committed; false if the id is free. */
 UMB_API bool umb_scene_object_bounds(const umb_scene *scene, uint32_t object, umb_aabb *out);
-/* Number of occluders as committed: shapes of objects that hide by themselves, welded ones, hand-made. */
+/* Number of occluders as committed: shapes of objects that hide by themselves, welded ones,
+ * hand-made. */
 UMB_API uint32_t umb_scene_occluder_count(const umb_scene *scene);
 /* Box around all objects as committed; false if there is none. */
 UMB_API bool umb_scene_bounds(const umb_scene *scene, umb_aabb *out);

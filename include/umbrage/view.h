@@ -8,9 +8,9 @@
  *            \  |  /     orthographic: the same without the division by d.forward.
  *              eye
  *
- * The frustum is closed. All members are doubles: the library works with them as they are, so that a
- * view has no rounding of its own. Besides the rules at the members: no number is larger than 1e30
- * (but for an infinite far), ranges are at least 1e-30 wide and 1e-12 of their ends' size.
+ * The frustum is closed. All members are doubles: the library works with them as they are, so that
+ * a view has no rounding of its own. Besides the rules at the members: no number is larger than
+ * 1e30 (but for an infinite far), ranges are at least 1e-30 wide and 1e-12 of their ends' size.
  */
 #ifndef UMBRAGE_VIEW_H
 #define UMBRAGE_VIEW_H
@@ -64,10 +64,11 @@ typedef struct umb_matrix_def {
     bool y_down;         /* clip y grows downwards (Vulkan) */
 } umb_matrix_def;
 
-/* Look from eye at target. fov_y: full vertical angle in radians, in (0, pi). aspect: width / height.
- * Where the direction runs along up (squared sine of the angle at most 1e-12) the axis after up's
- * largest component takes up's place (x, y, z, x). Errors: UMB_ERROR_ARGUMENT for non-finite input,
- * eye equal to target, impossible angles or depths. The sizes, thresholds and planes of *out are zeroed. */
+/* Look from eye at target. fov_y: full vertical angle in radians, in (0, pi). aspect: width /
+ * height. Where the direction runs along up (squared sine of the angle at most 1e-12) the axis
+ * after up's largest component takes up's place (x, y, z, x). Errors: UMB_ERROR_ARGUMENT for
+ * non-finite input, eye equal to target, impossible angles or depths. The sizes, thresholds and
+ * planes of *out are zeroed. */
 UMB_API umb_result umb_view_look_at(umb_view *out, const double eye[3], const double target[3],
                                     const double up[3], double fov_y, double aspect, double near_depth,
                                     double far_depth);
@@ -77,13 +78,13 @@ UMB_API umb_result umb_view_look_at_ortho(umb_view *out, const double eye[3], co
                                           const double up[3], double height, double aspect, double near_depth,
                                           double far_depth);
 /* Recover a view from a projection * view matrix after Gribb and Hartmann (Gummerus 4.1): either
- * handedness, any depth range, reversed or infinite, off-centre, perspective or parallel. Matrices with
- * shear between depth and the picture (oblique near planes), NaN or no inverse are UMB_ERROR_ARGUMENT.
- * Clip w must grow away from the eye. A parallel view's eye is put in the middle of its near rectangle,
- * and its near_depth is 0. */
+ * handedness, any depth range, reversed or infinite, off-centre, perspective or parallel. Matrices
+ * with shear between depth and the picture (oblique near planes), NaN or no inverse are
+ * UMB_ERROR_ARGUMENT. Clip w must grow away from the eye. A parallel view's eye is put in the
+ * middle of its near rectangle, and its near_depth is 0. */
 UMB_API umb_result umb_view_from_matrix(umb_view *out, const umb_matrix_def *def);
-/* UMB_OK when the view obeys every rule written above; else UMB_ERROR_ARGUMENT, with text when error
- * is not NULL. Every call that takes a view checks it so. */
+/* UMB_OK when the view obeys every rule written above; else UMB_ERROR_ARGUMENT, with text when
+ * error is not NULL. Every call that takes a view checks it so. */
 UMB_API umb_result umb_view_check(const umb_view *view, umb_error *error);
 
 /* Six frustum planes and the extra ones, unit normals pointing inwards, in the order left, right,

@@ -61,7 +61,8 @@ void umb_memory_free(const umb_allocator *a, void *p, size_t bytes)
     }
 }
 
-bool umb_memory_reserve(const umb_allocator *a, void **array, size_t *capacity, size_t need, size_t size)
+bool umb_memory_reserve(const umb_allocator *a, void **array, size_t *capacity, size_t need,
+                        size_t size)
 {
     if (need <= *capacity) {
         return true;

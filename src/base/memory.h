@@ -12,8 +12,9 @@ void *umb_memory_allocate(const umb_allocator *a, size_t bytes);
 void *umb_memory_allocate_zero(const umb_allocator *a, size_t count, size_t size);
 void umb_memory_free(const umb_allocator *a, void *p, size_t bytes);
 
-/* Make room for at least need elements of size bytes; *capacity counts elements. Keeps the contents.
- * Grows by half as much again. False when there is no memory: array and capacity stay as they were. */
+/* Make room for at least need elements of size bytes; *capacity counts elements. Keeps the
+ * contents. Grows by half as much again. False when there is no memory: array and capacity stay as
+ * they were. */
 bool umb_memory_reserve(const umb_allocator *a, void **array, size_t *capacity, size_t need, size_t size);
 
 /* Fill in an error, if there is one, and return code. */

@@ -1,9 +1,9 @@
 /* A pool of threads that serves one run at a time.
  *
- * A run opens a job; the caller and every thread that wakes in time draw task numbers from one counter
- * until none is left; the caller closes the job and waits for the threads still inside. A thread that
- * wakes late finds the job closed, or the counter used up, and does nothing: so no run waits for a
- * thread that has no work. */
+ * A run opens a job; the caller and every thread that wakes in time draw task numbers from one
+ * counter until none is left; the caller closes the job and waits for the threads still inside. A
+ * thread that wakes late finds the job closed, or the counter used up, and does nothing: so no run
+ * waits for a thread that has no work. */
 #include <pthread.h>
 #include <stdatomic.h>
 
@@ -28,7 +28,8 @@ struct umb_pool {
     pthread_t threads[MAX_WORKERS];
 };
 
-void umb_tasks_run(const umb_tasks *tasks, void (*task)(void *data, uint32_t i), void *data, uint32_t count)
+void umb_tasks_run(const umb_tasks *tasks, void (*task)(void *data, uint32_t i), void *data,
+                   uint32_t count)
 {
     if (tasks != NULL && tasks->run != NULL && count > 1) {
         tasks->run(tasks->user, task, data, count);
@@ -39,7 +40,8 @@ void umb_tasks_run(const umb_tasks *tasks, void (*task)(void *data, uint32_t i),
     }
 }
 
-static void draw_tasks(umb_pool *pool, void (*task)(void *data, uint32_t i), void *data, uint64_t count)
+static void draw_tasks(umb_pool *pool, void (*task)(void *data, uint32_t i), void *data,
+                       uint64_t count)
 {
     for (;;) {
         uint64_t i = atomic_fetch_add_explicit(&pool->next, 1, memory_order_relaxed);

@@ -1,5 +1,5 @@
-/* Working memory of one long call: blocks are taken as needed and given back together, so that every
- * way out of the call frees everything. */
+/* Working memory of one long call: blocks are taken as needed and given back together, so that
+ * every way out of the call frees everything. */
 #ifndef UMB_SCRATCH_H
 #define UMB_SCRATCH_H
 

@@ -22,8 +22,8 @@ static void insertion_sort(uint64_t *keys, uint32_t *values, size_t count)
 }
 
 /* One pass of the least-significant-digit-first radix sort. */
-static void scatter(const uint64_t *keys, const uint32_t *values, uint64_t *to_keys, uint32_t *to_values,
-                    size_t count, uint32_t shift, size_t *starts)
+static void scatter(const uint64_t *keys, const uint32_t *values, uint64_t *to_keys,
+                    uint32_t *to_values, size_t count, uint32_t shift, size_t *starts)
 {
     for (size_t i = 0; i < count; ++i) {
         size_t to = starts[(keys[i] >> shift) & (DIGIT_VALUES - 1)]++;

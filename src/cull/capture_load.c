@@ -1,5 +1,5 @@
-/* Reading a captured frame: umb_capture_load(). Nothing in the block is believed before it is checked:
- * a checksum keeps accidents out, not malice. */
+/* Reading a captured frame: umb_capture_load(). Nothing in the block is believed before it is
+ * checked: a checksum keeps accidents out, not malice. */
 #include <string.h>
 
 #include "base/checksum.h"
@@ -71,12 +71,14 @@ static umb_result fail_call(const loader *l, umb_result result, const char *what
 
 static umb_result check_header(loader *l)
 {
-    if (l->bytes == NULL || l->size < UMB_CAPTURE_HEADER || memcmp(l->bytes, UMB_CAPTURE_MAGIC, 8) != 0) {
+    if (l->bytes == NULL || l->size < UMB_CAPTURE_HEADER ||
+        memcmp(l->bytes, UMB_CAPTURE_MAGIC, 8) != 0) {
         return fail(l, "no captured frame");
     }
     uint32_t version = (uint32_t)get(l->bytes + 8, 4);
     if (version != UMB_CAPTURE_VERSION) {
-        return umb_error_set(l->error, UMB_ERROR_VERSION, "capture: version %u, this library reads %u", version,
+        return umb_error_set(l->error, UMB_ERROR_VERSION,
+                             "capture: version %u, this library reads %u", version,
                              UMB_CAPTURE_VERSION);
     }
     if (get(l->bytes + 12, 4) != UMB_CAPTURE_HEADER || get(l->bytes + 16, 8) != l->size) {
@@ -186,8 +188,9 @@ static umb_result read_meshes(loader *l, umb_scratch *scratch)
         position += p;
         triangle += t;
     }
-    return position == position_count && triangle == triangle_count ? UMB_OK
-                                                                    : fail(l, "more triangles than meshes");
+    return position == position_count && triangle == triangle_count
+               ? UMB_OK
+               : fail(l, "more triangles than meshes");
 }
 
 static umb_transform get_transform(loader *l)
@@ -220,7 +223,8 @@ static umb_result read_object(loader *l)
     bool known = get_shape(l, &def.shape);
     uint32_t marks = get_word(l), id = UMB_NONE;
     bool used = (marks & UMB_CAPTURE_USED) != 0;
-    if (!known || (marks & ~(uint32_t)UMB_CAPTURE_MARKS) != 0 || (!used && (marks != 0 || def.shape != 0))) {
+    if (!known || (marks & ~(uint32_t)UMB_CAPTURE_MARKS) != 0 ||
+        (!used && (marks != 0 || def.shape != 0))) {
         return UMB_ERROR_FORMAT;
     }
     def.flags = (marks & UMB_CAPTURE_LIVE) != 0 ? 0 : UMB_OBJECT_IGNORED;
@@ -270,8 +274,8 @@ static umb_result read_index(loader *l, umb_scratch *scratch)
         refs[i / UMB_NODE_WIDTH][i % UMB_NODE_WIDTH] = get_word(l);
     }
     umb_index_def def = {.kind = l->out->kind, .tasks = l->tasks};
-    umb_result result = umb_index_restore(l->out->scene, &def, (const uint32_t(*)[UMB_NODE_WIDTH])refs, count,
-                                          &l->out->index);
+    umb_result result = umb_index_restore(
+        l->out->scene, &def, (const uint32_t(*)[UMB_NODE_WIDTH])refs, count, &l->out->index);
     return result == UMB_OK ? UMB_OK : fail_call(l, result, "index's nodes");
 }
 
@@ -325,8 +329,8 @@ static umb_result load(loader *l, umb_scratch *scratch)
     return result == UMB_OK ? UMB_OK : fail_call(l, result, "culler");
 }
 
-umb_result umb_capture_load(const void *bytes, size_t size, umb_isa isa, umb_tasks tasks, umb_capture *out,
-                            umb_error *error)
+umb_result umb_capture_load(const void *bytes, size_t size, umb_isa isa, umb_tasks tasks,
+                            umb_capture *out, umb_error *error)
 {
     memset(out, 0, sizeof *out);
     umb_allocator allocator = umb_memory_allocator(NULL);

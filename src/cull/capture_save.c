@@ -105,7 +105,8 @@ static void lay_out(saver *s)
     s->counts[UMB_CAPTURE_MESHES] = s->mesh_count;
     s->counts[UMB_CAPTURE_FLAGS] = s->counts[UMB_CAPTURE_TRIANGLES];
     s->counts[UMB_CAPTURE_OBJECTS] = s->committed->object_count;
-    s->counts[UMB_CAPTURE_OCCLUDERS] = s->committed->occluder_count - s->committed->first_free_occluder;
+    s->counts[UMB_CAPTURE_OCCLUDERS] = s->committed->occluder_count -
+                                       s->committed->first_free_occluder;
     s->counts[UMB_CAPTURE_NODES] = s->tree->node_count;
     s->counts[UMB_CAPTURE_ANSWER] = s->answer_count;
     s->size = UMB_CAPTURE_HEADER;
@@ -123,8 +124,8 @@ static void put_frame(saver *s)
     put_doubles(s, v->right, 3);
     put_doubles(s, v->up, 3);
     put_doubles(s, v->forward, 3);
-    const double numbers[8] = {v->x_min,     v->x_max,      v->y_min, v->y_max, v->near_depth,
-                               v->far_depth, v->min_pixels, v->time};
+    const double numbers[8] = {v->x_min,      v->x_max,     v->y_min,      v->y_max,
+                               v->near_depth, v->far_depth, v->min_pixels, v->time};
     put_doubles(s, numbers, 8);
     for (uint32_t i = 0; i < UMB_MAX_CLIP_PLANES; ++i) {
         static const double none[4] = {0, 0, 0, 0};
@@ -166,7 +167,11 @@ static void put_meshes(saver *s, uint8_t *bytes)
         const umb_mesh *mesh = s->meshes[m];
         for (uint32_t t = 0; t < mesh->seen_count; ++t) {
             bool blocks = t < mesh->triangle_count;
-            put(s, !blocks ? UMB_TRIANGLE_OPEN : mesh->two_sided[t] ? UMB_TRIANGLE_TWO_SIDED : 0, 1);
+            put(s,
+                !blocks              ? UMB_TRIANGLE_OPEN
+                : mesh->two_sided[t] ? UMB_TRIANGLE_TWO_SIDED
+                                     : 0,
+                1);
         }
     }
 }
@@ -242,8 +247,9 @@ umb_result umb_capture_save(const umb_culler *culler, void *bytes, size_t capaci
     saver s = {.culler = culler};
     s.view = umb_culler_last_view(culler, &s.answer, &s.answer_count);
     if (s.view == NULL) {
-        return umb_error_set(umb_culler_settings(culler).error, UMB_ERROR_STATE,
-                             "nothing to capture: no view has been answered since the scene changed");
+        return umb_error_set(
+            umb_culler_settings(culler).error, UMB_ERROR_STATE,
+            "nothing to capture: no view has been answered since the scene changed");
     }
     const umb_index *index = umb_culler_index(culler);
     s.scene = umb_index_scene(index);
@@ -252,7 +258,8 @@ umb_result umb_capture_save(const umb_culler *culler, void *bytes, size_t capaci
     umb_scratch scratch = {.allocator = umb_scene_allocator(s.scene)};
     umb_result result = UMB_OK;
     if (!gather_meshes(&s, &scratch)) {
-        result = umb_error_set(umb_culler_settings(culler).error, UMB_ERROR_MEMORY, "no memory for a capture");
+        result = umb_error_set(umb_culler_settings(culler).error, UMB_ERROR_MEMORY,
+                               "no memory for a capture");
     } else {
         lay_out(&s);
         *size = (size_t)s.size;

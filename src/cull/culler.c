@@ -7,9 +7,9 @@
  *       object:   test the parts of its shape; draw the occluder that it owns; let it wait until what
  *                 may be seen of it is settled; report it
  *
- * Best-first, not depth-first: an occluder that can hide the nearest point of a box has the smaller key, so
- * it is already in the buffer when the box's turn comes; and when an object is settled, all that can hide
- * any of it are.
+ * Best-first, not depth-first: an occluder that can hide the nearest point of a box has the smaller
+ * key, so it is already in the buffer when the box's turn comes; and when an object is settled, all
+ * that can hide any of it are.
  */
 #include "culler.h"
 
@@ -42,7 +42,7 @@ struct umb_culler {
     size_t found_capacity, object_capacity, inside_capacity, plane_capacity;
     uint32_t count;
     bool answered;
-    umb_view view; /* of the last answer */
+    umb_view view;    /* of the last answer */
     uint64_t version; /* of the scene that it was given for */
 };
 
@@ -67,8 +67,8 @@ umb_result umb_culler_create(const umb_index *index, const umb_culler_def *def, 
     *out = NULL;
     const umb_box_kernels *kernels = umb_box_kernels_get(def->isa);
     if (kernels == NULL) {
-        return umb_error_set(def->error, UMB_ERROR_ARGUMENT, "instruction set %s is not available here",
-                             umb_isa_name(def->isa));
+        return umb_error_set(def->error, UMB_ERROR_ARGUMENT,
+                             "instruction set %s is not available here", umb_isa_name(def->isa));
     }
     if (def->method != UMB_METHOD_RASTER && def->method != UMB_METHOD_NONE) {
         return umb_error_set(def->error, UMB_ERROR_ARGUMENT, "unknown method %d", (int)def->method);
@@ -108,7 +108,8 @@ void umb_culler_destroy(umb_culler *c)
     umb_memory_free(&a, c, sizeof *c);
 }
 
-/* Everything that a walk can need, so that it never allocates: each item and node waits at most once. */
+/* Everything that a walk can need, so that it never allocates: each item and node waits at most
+ * once. */
 static bool reserve(umb_culler *c, const umb_tree *tree, const umb_committed *scene)
 {
     const umb_allocator *a = &c->allocator;
@@ -156,7 +157,8 @@ static bool too_small(walk *w, uint32_t ref, const umb_image_bounds *b)
     return small;
 }
 
-static void consider(walk *w, const umb_node *node, const umb_projected *p, uint32_t slot, uint16_t planes)
+static void consider(walk *w, const umb_node *node, const umb_projected *p, uint32_t slot,
+                     uint16_t planes)
 {
     umb_waiting item = {0};
     item.nearest = p->w_min[slot];
@@ -167,8 +169,8 @@ static void consider(walk *w, const umb_node *node, const umb_projected *p, uint
     item.testable = item.nearest >= w->map.near_depth && (w->map.orthographic || item.nearest > 0.0);
     w->stats.in_frustum += (item.ref & UMB_REF_KIND) == UMB_REF_OBJECT;
     if (item.testable) {
-        umb_image_bounds b = {p->x_min[slot], p->y_min[slot], p->x_max[slot], p->y_max[slot],
-                              p->w_min[slot], p->w_max[slot]};
+        umb_image_bounds b = {p->x_min[slot], p->y_min[slot], p->x_max[slot],
+                              p->y_max[slot], p->w_min[slot], p->w_max[slot]};
         if (too_small(w, item.ref, &b)) {
             return;
         }
@@ -189,8 +191,8 @@ static void open_node(walk *w, uint32_t number, uint16_t planes)
     umb_culler *c = w->culler;
     const umb_node *node = &w->tree->nodes[number];
     uint16_t child_planes[UMB_NODE_WIDTH];
-    uint32_t outside = umb_frustum_test_node(&w->frustum, c->kernels, node, planes, &c->planes[number],
-                                             child_planes);
+    uint32_t outside = umb_frustum_test_node(&w->frustum, c->kernels, node, planes,
+                                             &c->planes[number], child_planes);
     uint32_t left = ~outside & ((1u << node->count) - 1u);
     w->stats.nodes += 1;
     w->stats.boxes += node->count;
@@ -206,8 +208,8 @@ static void open_node(walk *w, uint32_t number, uint16_t planes)
     }
 }
 
-/* Draw an occluder, unless its box's image is too small to cover anything worth having: a silhouette of
- * three pixels across covers one at most. */
+/* Draw an occluder, unless its box's image is too small to cover anything worth having: a
+ * silhouette of two pixels across covers one at most. */
 static void draw(walk *w, uint32_t occluder, const umb_waiting *item)
 {
     const umb_culler *c = w->culler;
@@ -238,10 +240,11 @@ static bool object_shows(walk *w, const umb_object *o, umb_waiting *item)
     return umb_detail_shows(&asker, o, item->ref, &item->part, &item->settled);
 }
 
-/* An object whose turn has come. It is reported only when everything that can hide it has been drawn: until
- * then it waits again, for the depth of its far end, and may yet turn out to be hidden. One that hides by
- * its own shape is asked about at once, too, because it is to be drawn before what is behind it; its wait
- * then ends where what may be seen of it ends. True if it waits. */
+/* An object whose turn has come. It is reported only when everything that can hide it has been
+ * drawn: until then it waits again, for the depth of its far end, and may yet turn out to be
+ * hidden. One that hides by its own shape is asked about at once, too, because it is to be drawn
+ * before what is behind it; its wait then ends where what may be seen of it ends. True if it
+ * waits. */
 static bool visit_object(walk *w, umb_waiting *item, const umb_heap_entry *entry)
 {
     const umb_object *o = &w->scene->objects[item->ref & UMB_REF_NUMBER];
@@ -375,13 +378,15 @@ bool umb_culler_read_buffer(const umb_culler *c, float *pixels, size_t capacity,
     bool parallel = c->view.projection == UMB_ORTHOGRAPHIC;
     for (uint32_t y = 0; y < b->height; ++y) {
         for (uint32_t x = 0; x < b->width; ++x) {
-            const umb_tile *t =
-                &b->tiles[(size_t)(y / UMB_TILE_HEIGHT) * b->columns + x / UMB_TILE_WIDTH];
+            const umb_tile
+                *t = &b->tiles[(size_t)(y / UMB_TILE_HEIGHT) * b->columns + x / UMB_TILE_WIDTH];
             uint32_t r = y % UMB_TILE_HEIGHT, column = x % UMB_TILE_WIDTH;
             bool covered = (t->mask[r] >> column & 1u) != 0;
             float z = t->z[4 * (r / 4) + column / 8];
-            pixels[(size_t)y * b->width + x] =
-                !covered ? 0.0f : parallel ? (float)(1.0 / (1.0 - z - c->view.near_depth)) : z;
+            pixels[(size_t)y * b->width + x] = !covered ? 0.0f
+                                               : parallel
+                                                   ? (float)(1.0 / (1.0 - z - c->view.near_depth))
+                                                   : z;
         }
     }
     return true;

@@ -6,8 +6,8 @@
 
 const umb_index *umb_culler_index(const umb_culler *culler);
 umb_culler_def umb_culler_settings(const umb_culler *culler);
-/* The view and answer of the last umb_cull; NULL before the first, and when the scene has changed since:
- * what the answer was given for is then gone. */
+/* The view and answer of the last umb_cull; NULL before the first, and when the scene has changed
+ * since: what the answer was given for is then gone. */
 const umb_view *umb_culler_last_view(const umb_culler *culler, const uint32_t **ids, uint32_t *count);
 
 #endif

@@ -4,7 +4,8 @@
 
 #include "geometry/transform.h"
 
-bool umb_detail_hidden(const umb_asker *a, uint32_t ref, const umb_image *image, const umb_outline *outline)
+bool umb_detail_hidden(const umb_asker *a, uint32_t ref, const umb_image *image,
+                       const umb_outline *outline)
 {
     umb_query query = {*image, outline, ref};
     umb_verdict verdict;
@@ -25,7 +26,8 @@ static void place_triangle(const umb_object *o, const uint32_t corner[3], float 
     }
 }
 
-/* True if the middle of a triangle is open to the eye: most visible things are found by this alone. */
+/* True if the middle of a triangle is open to the eye: most visible things are found by this
+ * alone. */
 static bool middle_shows(const umb_asker *a, const float world[3][3], double *settled)
 {
     const umb_raster_map *map = a->map;
@@ -47,7 +49,8 @@ static bool middle_shows(const umb_asker *a, const float world[3][3], double *se
                            map->orthographic ? -middle.w : r);
 }
 
-static bool leaf_middle_shows(const umb_asker *a, const umb_object *o, const umb_part *part, double *settled)
+static bool leaf_middle_shows(const umb_asker *a, const umb_object *o, const umb_part *part,
+                              double *settled)
 {
     for (uint32_t i = part->begin; i < part->end; ++i) {
         float world[3][3];
@@ -59,8 +62,8 @@ static bool leaf_middle_shows(const umb_asker *a, const umb_object *o, const umb
     return false;
 }
 
-static bool triangle_shows(const umb_asker *a, uint32_t ref, const float world[3][3], const umb_face *face,
-                           double *settled)
+static bool triangle_shows(const umb_asker *a, uint32_t ref, const float world[3][3],
+                           const umb_face *face, double *settled)
 {
     umb_image_bounds b;
     umb_outline outline;
@@ -115,7 +118,8 @@ static bool box_shows(const umb_asker *a, const umb_object *o, uint32_t ref, uin
     }
 }
 
-bool umb_detail_shows(const umb_asker *a, const umb_object *o, uint32_t ref, uint32_t *part, double *settled)
+bool umb_detail_shows(const umb_asker *a, const umb_object *o, uint32_t ref, uint32_t *part,
+                      double *settled)
 {
     const umb_mesh *mesh = o->mesh;
     while (*part < mesh->part_count) {

@@ -1,4 +1,5 @@
-/* Asking a method about an object in detail: by the parts of its shape, then by single triangles. */
+/* Asking a method about an object in detail: by the parts of its shape, then by single
+ * triangles. */
 #ifndef UMB_DETAIL_H
 #define UMB_DETAIL_H
 
@@ -16,10 +17,10 @@ typedef struct umb_asker {
 /* One question: all of an image, or the outline in it. */
 bool umb_detail_hidden(const umb_asker *a, uint32_t ref, const umb_image *image, const umb_outline *outline);
 
-/* Walk the parts of an object that is its shape, from *part on to the first that may be seen, and stay
- * there: parts passed over are hidden and remain so. False if all are. *settled becomes the greatest view
- * depth, in view, of what may be seen: nothing drawn beyond it can hide that. The object's bounds have
- * been asked about before. */
+/* Walk the parts of an object that is its shape, from *part on to the first that may be seen, and
+ * stay there: parts passed over are hidden and remain so. False if all are. *settled becomes the
+ * greatest view depth, in view, of what may be seen: nothing drawn beyond it can hide that. The
+ * object's bounds have been asked about before. */
 bool umb_detail_shows(const umb_asker *a, const umb_object *o, uint32_t ref, uint32_t *part, double *settled);
 
 #endif

@@ -4,7 +4,8 @@
 
 bool umb_heap_reserve(umb_heap *h, const umb_allocator *a, size_t count)
 {
-    return umb_memory_reserve(a, (void **)&h->entries, &h->entry_capacity, count, sizeof *h->entries) &&
+    return umb_memory_reserve(a, (void **)&h->entries, &h->entry_capacity, count,
+                              sizeof *h->entries) &&
            umb_memory_reserve(a, (void **)&h->slots, &h->slot_capacity, count, sizeof *h->slots) &&
            umb_memory_reserve(a, (void **)&h->free, &h->free_capacity, count, sizeof *h->free);
 }

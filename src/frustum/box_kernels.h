@@ -1,4 +1,5 @@
-/* What is done with a node's eight boxes at once, built for each instruction set from one source. */
+/* What is done with a node's eight boxes at once, built for each instruction set from one
+ * source. */
 #ifndef UMB_BOX_KERNELS_H
 #define UMB_BOX_KERNELS_H
 
@@ -18,8 +19,9 @@ typedef struct umb_projector {
 
 /* Bounds of the image of each box: every point of the closed box has its true image and its true W
  * within them. Perspective: a box that reaches W <= 0, or comes so near to it that the bound of W's
- * rounding matters, has the range +-UMB_PROJECTED_ALL in x and y; w_min may be negative then. Boxes with
- * w_min > 0 and a smaller range lie in front of the eye. Nothing is infinite, nothing is NaN. */
+ * rounding matters, has the range +-UMB_PROJECTED_ALL in x and y; w_min may be negative then. Boxes
+ * with w_min > 0 and a smaller range lie in front of the eye. Nothing is infinite, nothing is
+ * NaN. */
 typedef struct umb_projected {
     double x_min[UMB_NODE_WIDTH], x_max[UMB_NODE_WIDTH];
     double y_min[UMB_NODE_WIDTH], y_max[UMB_NODE_WIDTH];

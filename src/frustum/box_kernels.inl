@@ -1,6 +1,6 @@
 /* The kernels, as loops over eight lanes without a branch: box_kernels_ISA.c includes this with
- * KERNELS defined and is compiled with that instruction set's flags. No lane depends on another, sums
- * run x, y, z, minima and maxima are (a < b ? a : b): so every build gives the same bits.
+ * KERNELS defined and is compiled with that instruction set's flags. No lane depends on another,
+ * sums run x, y, z, minima and maxima are (a < b ? a : b): so every build gives the same bits.
  *
  * Bounds: frustum.c for cull, below for project.
  */
@@ -106,14 +106,14 @@ static uint32_t cull(const umb_frustum *f, const umb_node *node, uint16_t planes
  *   d                one difference of doubles (faces and eye are exact)      v |d_i|
  *   X, Y, W          products v, sums 2 v                                     4 v k D each, with d's
  *
- * The extremes of X and W over the box are at corners, and rounding is monotone, so the computed ones
- * are the sums of each axis' smaller or larger product. [w_min, w_max] is widened by 8 v kw D: four for
- * W, one for the widening's own rounding.
+ * The extremes of X and W over the box are at corners, and rounding is monotone, so the computed
+ * ones are the sums of each axis' smaller or larger product. [w_min, w_max] is widened by 8 v kw D:
+ * four for W, one for the widening's own rounding.
  *
- * Perspective. Let W' be the smallest computed W of the box; it is taken only if W' > 2^12 v kw D, so
- * that W is within 2^-10 of itself at each corner, positive on the box, and the image of the box is the
- * hull of the images of its corners. With q = X / W and Q the larger absolute value of the computed
- * extremes of q:
+ * Perspective. Let W' be the smallest computed W of the box; it is taken only if W' > 2^12 v kw D,
+ * so that W is within 2^-10 of itself at each corner, positive on the box, and the image of the box
+ * is the hull of the images of its corners. With q = X / W and Q the larger absolute value of the
+ * computed extremes of q:
  *   q                |dX| / W + |q| |dW| / W                     4.1 v (D / W') (kx + kw Q)
  *   1 / W, times X   v each                                      2 v Q
  *   + cx, - margin   v each                                      2 v (Q + |cx|) and v margin
@@ -143,8 +143,8 @@ static inline double largest_of(const double v[3])
     return larger(fabs(v[0]), larger(fabs(v[1]), fabs(v[2])));
 }
 
-/* d of a box's six faces: 0 the lower face of an axis, 1 the upper. Plain members, no arrays: what the
- * compilers see through when they turn the lane loops into vectors. */
+/* d of a box's six faces: 0 the lower face of an axis, 1 the upper. Plain members, no arrays: what
+ * the compilers see through when they turn the lane loops into vectors. */
 typedef struct faces {
     double x0, x1, y0, y1, z0, z1;
 } faces;
@@ -216,7 +216,8 @@ static inline extent extend(extent e, double v)
     return r;
 }
 
-/* Written out, not a loop: a loop over corners inside the loop over lanes is not made into vectors. */
+/* Written out, not a loop: a loop over corners inside the loop over lanes is not made into
+ * vectors. */
 #define EACH_CORNER(f) f(0, 0, 0) f(1, 0, 0) f(0, 1, 0) f(1, 1, 0) f(0, 0, 1) f(1, 0, 1) f(0, 1, 1) f(1, 1, 1)
 #define CORNER(p, a, b, c) (((p).x##a + (p).y##b) + (p).z##c)
 #define PROJECT_CORNER(a, b, c)                                                                    \

@@ -1,4 +1,5 @@
-/* box_kernels.inl without vectors: the specification that every other instruction set must equal. */
+/* box_kernels.inl without vectors: the specification that every other instruction set must
+ * equal. */
 #include "box_kernels.h"
 
 #define KERNELS umb_box_kernels_scalar

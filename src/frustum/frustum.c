@@ -1,9 +1,9 @@
 /* Planes in the form that the box kernels want, and the bound of their rounding.
  *
- * The closed frustum is the set of points with g(p) = n.d + c >= 0 for every plane, where d = p - eye
- * and n, c are what view.h defines, in real numbers. A box is outside when g < 0 at its corner farthest
- * along n, for one plane; it is wholly inside a plane when g >= 0 at the opposite corner. The kernels
- * compute, in float,
+ * The closed frustum is the set of points with g(p) = n.d + c >= 0 for every plane, where d = p -
+ * eye and n, c are what view.h defines, in real numbers. A box is outside when g < 0 at its corner
+ * farthest along n, for one plane; it is wholly inside a plane when g >= 0 at the opposite corner.
+ * The kernels compute, in float,
  *
  *     d_i = (p_i - high_i) - low_i        G = ((n_0 d_0 + n_1 d_1) + n_2 d_2) + c
  *
@@ -46,7 +46,8 @@
 #define V 0x1p-53
 #define C_LARGEST 3e38
 
-/* A plane before it is scaled: normal, constant relative to the eye, bound of that constant's error. */
+/* A plane before it is scaled: normal, constant relative to the eye, bound of that constant's
+ * error. */
 typedef struct wide_plane {
     umb_vec3 n;
     double c, c_error;

@@ -1,4 +1,5 @@
-/* A view's frustum made ready for culling boxes: which planes, in which form, with which error bound. */
+/* A view's frustum made ready for culling boxes: which planes, in which form, with which error
+ * bound. */
 #ifndef UMB_FRUSTUM_H
 #define UMB_FRUSTUM_H
 
@@ -7,8 +8,8 @@
 
 #define UMB_FRUSTUM_PLANES (6 + UMB_MAX_CLIP_PLANES)
 
-/* g(p) = n.(p - eye) + c, at least 0 inside. Scaled by a power of two so that the largest component of
- * n lies in [1/8, 1/4]: no product of floats overflows, whatever the box. */
+/* g(p) = n.(p - eye) + c, at least 0 inside. Scaled by a power of two so that the largest component
+ * of n lies in [1/8, 1/4]: no product of floats overflows, whatever the box. */
 typedef struct umb_frustum_plane {
     float n[3];
     float c;
@@ -27,8 +28,8 @@ void umb_frustum_prepare(umb_frustum *f, const umb_view *view);
 
 struct umb_box_kernels;
 
-/* Test a node's eight boxes against the planes in the mask `planes` (Gummerus 4.2 to 4.4: the corner
- * farthest along a plane's normal and the nearest one, masking, plane coherency).
+/* Test a node's eight boxes against the planes in the mask `planes` (Gummerus 4.2 to 4.4: the
+ * corner farthest along a plane's normal and the nearest one, masking, plane coherency).
  *   returns   a bit for each slot that is outside one of these planes, and for each empty slot
  *   remember  this node's own byte, 0 at first: the plane to begin with; becomes the plane at which the
  *             last box was found outside. May be NULL. It never changes the answer

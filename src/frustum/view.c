@@ -8,8 +8,8 @@
 
 /* Axes may be off unit length and right angles by this much (view.h). */
 #define AXIS_TOLERANCE 1e-6
-/* Nothing in a view is larger than this, and no extent is smaller than its inverse: reciprocals stay
- * inside the range of a float, squares and products inside that of a double. */
+/* Nothing in a view is larger than this, and no extent is smaller than its inverse: reciprocals
+ * stay inside the range of a float, squares and products inside that of a double. */
 #define LARGEST 1e30
 
 static bool all_finite(const double *v, uint32_t count)
@@ -139,7 +139,8 @@ umb_result umb_view_check(const umb_view *view, umb_error *error)
 
 /* ---- from an eye and a target --------------------------------------------------------------- */
 
-/* The axis that stands in for up where the view runs along it: the one after up's largest component. */
+/* The axis that stands in for up where the view runs along it: the one after up's largest
+ * component. */
 static umb_vec3 axis_after(umb_vec3 up)
 {
     double x = fabs(up.x);
@@ -260,8 +261,8 @@ static bool read_rows(const umb_matrix_def *def, row rows[4])
     return true;
 }
 
-/* The two half-spaces of the depth row, both >= 0 inside: beyond the near plane, before the far one.
- * This is Gribb and Hartmann's extraction (Gummerus 4.1) for each depth range. */
+/* The two half-spaces of the depth row, both >= 0 inside: beyond the near plane, before the far
+ * one. This is Gribb and Hartmann's extraction (Gummerus 4.1) for each depth range. */
 static bool depth_rows(const umb_matrix_def *def, const row rows[4], row *beyond_near,
                        row *before_far)
 {
@@ -298,7 +299,8 @@ static double determinant(umb_vec3 a, umb_vec3 b, umb_vec3 c)
     return umb_vec3_dot(a, umb_vec3_cross(b, c));
 }
 
-/* The point where three rows are zero, by Cramer's rule; false when their normals lie in one plane. */
+/* The point where three rows are zero, by Cramer's rule; false when their normals lie in one
+ * plane. */
 static bool meet(row a, row b, row c, umb_vec3 *out)
 {
     double scale = umb_vec3_length(a.n) * umb_vec3_length(b.n) * umb_vec3_length(c.n);
@@ -313,8 +315,8 @@ static bool meet(row a, row b, row c, umb_vec3 *out)
     return isfinite(out->x) && isfinite(out->y) && isfinite(out->z);
 }
 
-/* Split a picture row into its axis and the range that -1..1 stands for: the row is
- * across (d.axis) + along (d.forward), and s (d.forward) is clip w. sign -1 turns the axis round. */
+/* Split a picture row into its axis and the range that -1..1 stands for: the row is across (d.axis)
+ * + along (d.forward), and s (d.forward) is clip w. sign -1 turns the axis round. */
 static bool split_row(row r, umb_vec3 forward, double s, double sign, double axis[3], double *low,
                       double *high)
 {

@@ -4,8 +4,8 @@
 
 #include <stdbool.h>
 
-/* Sign (-1, 0, 1) of the z component of (b - a) x (c - a), from the coordinates i and j of the points;
- * exact for all finite floats. */
+/* Sign (-1, 0, 1) of the z component of (b - a) x (c - a), from the coordinates i and j of the
+ * points; exact for all finite floats. */
 int umb_collinear_turn(const float a[3], const float b[3], const float c[3], int i, int j);
 
 /* True if the three points lie exactly on one line (two may be equal). */

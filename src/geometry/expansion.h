@@ -4,8 +4,8 @@
 
 #define UMB_EXPANSION_TERMS 48
 
-/* A sum of a and b without loss: *high is the rounded sum, *low what rounding took (Knuth's two-sum,
- * right for all doubles that do not overflow). */
+/* A sum of a and b without loss: *high is the rounded sum, *low what rounding took (Knuth's
+ * two-sum, right for all doubles that do not overflow). */
 static inline void umb_two_sum(double a, double b, double *high, double *low)
 {
     double s = a + b;
@@ -15,8 +15,8 @@ static inline void umb_two_sum(double a, double b, double *high, double *low)
 }
 
 /* The sign of an exact sum of at most UMB_EXPANSION_TERMS doubles: terms are added one by one to an
- * expansion whose parts do not overlap and grow in size (Shewchuk's grow-expansion); the last non-zero
- * part has the sign of the whole. */
+ * expansion whose parts do not overlap and grow in size (Shewchuk's grow-expansion); the last
+ * non-zero part has the sign of the whole. */
 static inline int umb_sign_of_sum(const double *terms, int count)
 {
     double parts[UMB_EXPANSION_TERMS];

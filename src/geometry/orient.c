@@ -1,6 +1,7 @@
-/* Three ways to the sign, each tried where the one before it cannot tell: doubles with a bound of their
- * error; integers, where the differences of the points are short enough; a sum of exact terms. Points of
- * one plane never pass the first, and are what is asked about most: the second is for them. */
+/* Three ways to the sign, each tried where the one before it cannot tell: doubles with a bound of
+ * their error; integers, where the differences of the points are short enough; a sum of exact
+ * terms. Points of one plane never pass the first, and are what is asked about most: the second is
+ * for them. */
 #include "orient.h"
 
 #include <math.h>
@@ -10,9 +11,9 @@
 
 #include "expansion.h"
 
-/* Add det(p, q, r), or its negative, to the terms. A product of two floats has 48 bits: an exact double,
- * which Veltkamp's split cuts in halves of 24, so that each times a third float is exact again.
- * Exponents stay in [-447, 384]. */
+/* Add det(p, q, r), or its negative, to the terms. A product of two floats has 48 bits: an exact
+ * double, which Veltkamp's split cuts in halves of 24, so that each times a third float is exact
+ * again. Exponents stay in [-447, 384]. */
 static void add_determinant(double *terms, int *count, const float *p, const float *q,
                             const float *r, double sign)
 {
@@ -51,7 +52,8 @@ static bool to_integers(const double differences[3], int64_t out[3])
     }
     uint64_t bits;
     memcpy(&bits, &largest, sizeof bits);
-    /* 2^40 over the power of two at or below the largest; differences of floats are no subnormals. */
+    /* 2^40 over the power of two at or below the largest; differences of floats are no
+     * subnormals. */
     bits = largest > 0.0 ? (2 * 1023 + 40 - (bits >> 52)) << 52 : 0;
     double scale;
     memcpy(&scale, &bits, sizeof scale);

@@ -1,4 +1,5 @@
-/* The one place where a shape's vertex becomes a world vertex (umb_transform says how it rounds). */
+/* The one place where a shape's vertex becomes a world vertex (umb_transform says how it
+ * rounds). */
 #ifndef UMB_TRANSFORM_H
 #define UMB_TRANSFORM_H
 
@@ -7,7 +8,8 @@
 /* True if every entry is zero or the matrix is the identity: vertices are kept as they are. */
 bool umb_transform_is_identity(const umb_transform *t);
 
-/* True if the linear part turns counter-clockwise into clockwise (negative determinant, in double). */
+/* True if the linear part turns counter-clockwise into clockwise (negative determinant, in
+ * double). */
 bool umb_transform_mirrors(const umb_transform *t);
 
 /* World vertex: each row summed in double, in order, rounded once to float. */

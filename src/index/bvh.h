@@ -5,28 +5,29 @@
 #include "base/memory.h"
 #include "tree.h"
 
-/* A box and what it stands for. The fourth lane of min and max is never looked at: it lets four lanes
- * be worked on at once. */
+/* A box and what it stands for. The fourth lane of min and max is never looked at: it lets four
+ * lanes be worked on at once. */
 typedef struct umb_bvh_item {
     float min[4];
     float max[4];
     uint32_t ref; /* UMB_REF_OBJECT or UMB_REF_OCCLUDER */
 } umb_bvh_item;
 
-/* Build over count >= 1 items, whose order it changes. *nodes is allocated with a (*node_count entries)
- * and laid out parents first, siblings side by side. The tree depends on items and their order alone,
- * never on tasks. UMB_ERROR_MEMORY leaves nothing behind. */
+/* Build over count >= 1 items, whose order it changes. *nodes is allocated with a (*node_count
+ * entries) and laid out parents first, siblings side by side. The tree depends on items and their
+ * order alone, never on tasks. UMB_ERROR_MEMORY leaves nothing behind. */
 umb_result umb_bvh_build(const umb_allocator *a, const umb_tasks *tasks, umb_bvh_item *items,
                          uint32_t count, umb_node **nodes, uint32_t *node_count);
 
 /* Put the committed boxes into the slots again, leaves to root; the structure stays. */
 void umb_bvh_refit(umb_node *nodes, uint32_t node_count, const umb_committed *scene);
 
-/* Where each object is: 8 * node + slot; UMB_NONE for those in no node. places has object_count entries. */
+/* Where each object is: 8 * node + slot; UMB_NONE for those in no node. places has object_count
+ * entries. */
 void umb_bvh_find_places(const umb_node *nodes, uint32_t node_count, uint32_t *places,
                          uint32_t object_count);
-/* The same as umb_bvh_refit() when only the committed `moved` objects moved: from each of them up, as
- * far as boxes change. */
+/* The same as umb_bvh_refit() when only the committed `moved` objects moved: from each of them up,
+ * as far as boxes change. */
 void umb_bvh_refit_moved(umb_node *nodes, const uint32_t *places, const umb_committed *scene);
 
 /* Make the slots from count on as the layout wants them: slot 0's box, no reference. */
@@ -34,8 +35,8 @@ void umb_node_pad(umb_node *node);
 /* Box around a node's slots. */
 umb_aabb umb_node_bounds(const umb_node *node);
 
-/* Split items into a binary tree; bvh_split.c. Node k of the tree splits its items between k - 1 and
- * k: every position is used once, so threads need no counter to number their nodes. */
+/* Split items into a binary tree; bvh_split.c. Node k of the tree splits its items between k - 1
+ * and k: every position is used once, so threads need no counter to number their nodes. */
 typedef struct umb_bvh_split {
     uint32_t left, right;         /* a split, or an item with UMB_BVH_ITEM set */
     uint8_t pick[UMB_NODE_WIDTH]; /* [j - 1]: how many of j slots go left; 0: as for j - 1 slots, and
@@ -44,7 +45,8 @@ typedef struct umb_bvh_split {
 
 #define UMB_BVH_ITEM 0x80000000u
 
-/* splits has count entries ([0] is unused). Returns the root: a split, or item 0 when count is 1. */
+/* splits has count entries ([0] is unused). Returns the root: a split, or item 0 when count is
+ * 1. */
 umb_result umb_bvh_split_items(const umb_allocator *a, const umb_tasks *tasks, umb_bvh_item *items,
                                uint32_t count, umb_bvh_split *splits, uint32_t *root);
 

@@ -1,8 +1,8 @@
-/* The binary half of the build: top-down splits by the surface-area heuristic over bins, and bottom-up
- * the cheapest way to cut the binary tree into wide nodes.
+/* The binary half of the build: top-down splits by the surface-area heuristic over bins, and
+ * bottom-up the cheapest way to cut the binary tree into wide nodes.
  *
- * Ranges of items up to TASK_ITEMS are independent tasks. Which ranges these are depends on the items
- * alone, and so does everything done in them.
+ * Ranges of items up to TASK_ITEMS are independent tasks. Which ranges these are depends on the
+ * items alone, and so does everything done in them.
  */
 #include <math.h>
 #include <string.h>
@@ -16,10 +16,10 @@
 /* Below this depth ranges are halved: the tree is never deeper than this plus log2 of the count. */
 #define HALVE_DEPTH 48
 
-/* What a wide node costs beside its area over the root's, times the count of items. Area alone is the
- * chance of a ray; a region in view opens every node in it, and pays for nodes that are not full.
- * Measured on 200,000 boxes: 20 opens 1 to 16 % fewer nodes than 0 does in boxes of every size, for 1.4 %
- * more of the rays' cost; 100 starts to cost more in small regions. */
+/* What a wide node costs beside its area over the root's, times the count of items. Area alone is
+ * the chance of a ray; a region in view opens every node in it, and pays for nodes that are not
+ * full. Measured on 200,000 boxes: 20 opens 1 to 16 % fewer nodes than 0 does in boxes of every
+ * size, for 1.4 % more of the rays' cost; 100 starts to cost more in small regions. */
 #define NODE_COST 20.0
 
 typedef struct box4 {
@@ -58,7 +58,8 @@ static inline void box_grow(box4 *b, const float min[4], const float max[4])
     }
 }
 
-/* Half the surface, in double: the extents of finite floats cannot overflow it. 0 for an empty box. */
+/* Half the surface, in double: the extents of finite floats cannot overflow it. 0 for an empty
+ * box. */
 static double box_area(const float min[], const float max[])
 {
     double x = (double)max[0] - min[0];
@@ -67,7 +68,8 @@ static double box_area(const float min[], const float max[])
     return x >= 0.0 ? x * y + y * z + z * x : 0.0;
 }
 
-/* A quarter of the sum of the corners: half the centre, so that differences of any two are finite. */
+/* A quarter of the sum of the corners: half the centre, so that differences of any two are
+ * finite. */
 static inline float centroid(const umb_bvh_item *item, int axis)
 {
     return 0.25f * item->min[axis] + 0.25f * item->max[axis];
@@ -271,13 +273,15 @@ static uint32_t split_range(umb_bvh_item *items, const range *r, choice *best)
 
 /* ---- cutting into wide nodes ---------------------------------------------------------------- */
 
-/* The least cost of a subtree in at most j slots of a wide node; [0] is unused. All zero for an item. */
+/* The least cost of a subtree in at most j slots of a wide node; [0] is unused. All zero for an
+ * item. */
 typedef struct cut {
     float cost[UMB_NODE_WIDTH];
 } cut;
 
-/* The cheapest cut of a subtree into j slots or fewer, from its halves' (Ylitie, Karras, Laine 2017,
- * section 3.2): either some slots go left and the others right, or the subtree is a node of its own. */
+/* The cheapest cut of a subtree into j slots or fewer, from its halves' (Ylitie, Karras, Laine
+ * 2017, section 3.2): either some slots go left and the others right, or the subtree is a node of
+ * its own. */
 static cut cut_split(const build *b, umb_bvh_split *s, const box4 *box, const cut *left,
                      const cut *right)
 {

@@ -12,7 +12,8 @@ struct umb_index {
     umb_allocator allocator;
     umb_tasks tasks;
     umb_index_kind kind;
-    /* The state of the scene that the structure was built from: refitting needs all four unchanged. */
+    /* The state of the scene that the structure was built from: refitting needs all four
+     * unchanged. */
     uint64_t structure;
     uint32_t object_count, first_free_occluder, occluder_count;
 };
@@ -202,8 +203,8 @@ typedef struct restorer {
     bool flat;
 } restorer;
 
-/* The place of a slot's item or node in the list of what has been seen; UMB_NONE when it cannot be. A node
- * comes after the one that names it, so that no walk can run in circles. */
+/* The place of a slot's item or node in the list of what has been seen; UMB_NONE when it cannot be.
+ * A node comes after the one that names it, so that no walk can run in circles. */
 static uint32_t place_of(const restorer *r, uint32_t node, uint32_t ref)
 {
     uint32_t number = ref & UMB_REF_NUMBER;
@@ -302,7 +303,8 @@ static umb_result make_empty(umb_scene *scene, const umb_index_def *def, umb_ind
     return UMB_OK;
 }
 
-/* Its nodes are there: follow the scene from now on. Takes the index, and frees it after a failure. */
+/* Its nodes are there: follow the scene from now on. Takes the index, and frees it after a
+ * failure. */
 static umb_result start_following(umb_index *index, umb_result result, umb_index **out)
 {
     if (result != UMB_OK) {
@@ -362,8 +364,8 @@ static double half_area(const umb_aabb *b)
     return x * y + y * z + z * x;
 }
 
-/* A ray that meets the root meets a node in it with the ratio of their areas as probability, and then
- * tests its boxes (Gummerus 3.2 on surface areas; Goldsmith and Salmon 1987). */
+/* A ray that meets the root meets a node in it with the ratio of their areas as probability, and
+ * then tests its boxes (Gummerus 3.2 on surface areas; Goldsmith and Salmon 1987). */
 static double tree_cost(const umb_tree *tree)
 {
     if (tree->flat || tree->node_count == 0) {

@@ -14,9 +14,9 @@
 
 #define UMB_NODE_WIDTH 8
 
-/* Eight children whose boxes are arrays of components: one pass of SIMD covers them all. Objects are
- * children like nodes. Slots from count on are empty: their boxes are those of slot 0, so that kernels
- * may compute with them, and their refs are UMB_NONE. */
+/* Eight children whose boxes are arrays of components: one pass of SIMD covers them all. Objects
+ * are children like nodes. Slots from count on are empty: their boxes are those of slot 0, so that
+ * kernels may compute with them, and their refs are UMB_NONE. */
 typedef struct umb_node {
     float min[3][UMB_NODE_WIDTH];
     float max[3][UMB_NODE_WIDTH];
@@ -40,9 +40,10 @@ const umb_tree *umb_index_tree(const umb_index *index);
 umb_scene *umb_index_scene(const umb_index *index);
 umb_index_kind umb_index_get_kind(const umb_index *index);
 
-/* Make an index whose nodes hold what an earlier one's did (captures; a refitted tree is not the one
- * that building would give). refs: the slots of each node, UMB_NONE behind the last. Boxes come from the
- * scene. UMB_ERROR_FORMAT unless the nodes are one tree, or rows if flat, that holds each item once. */
+/* Make an index whose nodes hold what an earlier one's did (captures; a refitted tree is not the
+ * one that building would give). refs: the slots of each node, UMB_NONE behind the last. Boxes come
+ * from the scene. UMB_ERROR_FORMAT unless the nodes are one tree, or rows if flat, that holds each
+ * item once. */
 umb_result umb_index_restore(umb_scene *scene, const umb_index_def *def,
                              const uint32_t (*refs)[UMB_NODE_WIDTH], uint32_t node_count, umb_index **out);
 

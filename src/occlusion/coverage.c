@@ -100,9 +100,11 @@ bool umb_coverage_hides(const umb_coverage *c, umb_pixel_rect rect, float nearne
     return true;
 }
 
-/* Columns that an outline enters in a row, [*first, *last]; false if none. The row's closed band and the
- * outline are grown by the error; interpolating adds fewer than 16 units of the coordinates. */
-static bool outline_span(const umb_outline *o, uint32_t row, uint32_t width, uint32_t *first, uint32_t *last)
+/* Columns that an outline enters in a row, [*first, *last]; false if none. The row's closed band
+ * and the outline are grown by the error; interpolating adds fewer than 16 units of the
+ * coordinates. */
+static bool outline_span(const umb_outline *o, uint32_t row, uint32_t width, uint32_t *first,
+                         uint32_t *last)
 {
     double low = INFINITY, high = -INFINITY, y0 = row - o->error, y1 = row + 1.0 + o->error;
     for (uint32_t i = 0; i < o->count; ++i) {
@@ -114,7 +116,8 @@ static bool outline_span(const umb_outline *o, uint32_t row, uint32_t width, uin
         double x[2] = {px, qx}, y[2] = {py, qy};
         for (int end = 0; end < 2; ++end) {
             double cut = y[end] < y0 ? y0 : y[end] > y1 ? y1 : y[end];
-            /* An end outside the band: move it to the border along the edge, never past the other end. */
+            /* An end outside the band: move it to the border along the edge, never past the other
+             * end. */
             double at = cut == y[end] ? x[end] : px + (cut - py) * ((qx - px) / (qy - py));
             double lo = px < qx ? px : qx, hi = px < qx ? qx : px;
             at = at < lo ? lo : at > hi ? hi : at;
@@ -129,7 +132,8 @@ static bool outline_span(const umb_outline *o, uint32_t row, uint32_t width, uin
         return false;
     }
     int32_t end = (int32_t)width - 1;
-    int32_t from = umb_pixel_floor(low - UMB_PIXEL_SLACK), to = umb_pixel_floor(high + UMB_PIXEL_SLACK);
+    int32_t from = umb_pixel_floor(low - UMB_PIXEL_SLACK),
+            to = umb_pixel_floor(high + UMB_PIXEL_SLACK);
     from = from < 0 ? 0 : from > end ? end : from;
     to = to < from ? from : to > end ? end : to;
     *first = (uint32_t)from;
@@ -137,7 +141,8 @@ static bool outline_span(const umb_outline *o, uint32_t row, uint32_t width, uin
     return true;
 }
 
-/* Most nearness of an outline over the sub-tile at (x, y), up by what covers the plane's relative 2^-22. */
+/* Most nearness of an outline over the sub-tile at (x, y), up by what covers the plane's relative
+ * 2^-22. */
 static double outline_nearness(const umb_outline *o, double x, double y)
 {
     double z = o->g0 + (o->gx * x + (o->gx > 0.0 ? o->gx * 8.0 : 0.0)) +
@@ -146,8 +151,8 @@ static double outline_nearness(const umb_outline *o, double x, double y)
     return z < o->most ? z : o->most;
 }
 
-static bool outline_row_hidden(const umb_coverage *c, const umb_outline *o, uint32_t row, uint32_t first,
-                               uint32_t last)
+static bool outline_row_hidden(const umb_coverage *c, const umb_outline *o, uint32_t row,
+                               uint32_t first, uint32_t last)
 {
     const umb_tile *tiles = c->tiles + (size_t)(row / UMB_TILE_HEIGHT) * c->columns;
     uint32_t r = row % UMB_TILE_HEIGHT, half = r / 4;
@@ -169,7 +174,8 @@ static bool outline_row_hidden(const umb_coverage *c, const umb_outline *o, uint
     return true;
 }
 
-bool umb_coverage_hides_outline(const umb_coverage *c, umb_pixel_rect rect, const umb_outline *outline)
+bool umb_coverage_hides_outline(const umb_coverage *c, umb_pixel_rect rect,
+                                const umb_outline *outline)
 {
     for (int row = rect.y0; row <= rect.y1; ++row) {
         uint32_t first, last;
@@ -185,7 +191,8 @@ void umb_coverage_merge(umb_coverage *c, uint32_t tile, const uint32_t mask[UMB_
                         const float z[8])
 {
     umb_tile *t = &c->tiles[tile];
-    uint32_t fresh[2] = {0, 0}, lone[2] = {0, 0}; /* bits that only mask has; bits that only the tile has */
+    uint32_t fresh[2] = {0, 0},
+             lone[2] = {0, 0}; /* bits that only mask has; bits that only the tile has */
     uint32_t all = ~0u;
     for (uint32_t r = 0; r < UMB_TILE_HEIGHT; ++r) {
         fresh[r / 4] |= mask[r] & ~t->mask[r];

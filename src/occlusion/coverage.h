@@ -5,12 +5,12 @@
  *   rows 0-3 [ z[0] ] [ z[1] ] [ z[2] ] [ z[3] ]     mask[r] bit c: pixel (c, r)
  *   rows 4-7 [ z[4] ] [ z[5] ] [ z[6] ] [ z[7] ]
  *
- * Depth is kept as nearness: 1 / w in perspective, -w in parallel views (w: depth along forward), both
- * affine over the raster for a plane, and greater is nearer.
+ * Depth is kept as nearness: 1 / w in perspective, -w in parallel views (w: depth along forward),
+ * both affine over the raster for a plane, and greater is nearer.
  *
- * Invariant: a set bit means that every point of that closed pixel is blocked by some occluder whose
- * nearness there is greater than the z of its sub-tile. z is +infinity while no bit is set. Pixels beyond
- * the raster's right and bottom borders are set from the start: nobody asks for them.
+ * Invariant: a set bit means that every point of that closed pixel is blocked by some occluder
+ * whose nearness there is greater than the z of its sub-tile. z is +infinity while no bit is set.
+ * Pixels beyond the raster's right and bottom borders are set from the start: nobody asks for them.
  */
 #ifndef UMB_COVERAGE_H
 #define UMB_COVERAGE_H
@@ -34,13 +34,14 @@ typedef struct umb_coverage {
     uint32_t columns, rows; /* tiles */
 } umb_coverage;
 
-/* Pixels touched by something: columns x0..x1, rows y0..y1, both ends included, inside the raster. */
+/* Pixels touched by something: columns x0..x1, rows y0..y1, both ends included, inside the
+ * raster. */
 typedef struct umb_pixel_rect {
     int16_t x0, y0, x1, y1;
 } umb_pixel_rect;
 
-/* A convex polygon on the raster, each true corner within error of the given one in each coordinate, and
- * its nearness: nowhere more than gx x + gy y + g0, nor than most. */
+/* A convex polygon on the raster, each true corner within error of the given one in each
+ * coordinate, and its nearness: nowhere more than gx x + gy y + g0, nor than most. */
 typedef struct umb_outline {
     double x[9], y[9];
     uint32_t count;

@@ -56,7 +56,8 @@ static double clamp(double v, double low, double high)
 static void touch(umb_fill *f, uint32_t row, double low, double high)
 {
     int32_t first = 32 * (int32_t)f->word0, last = 32 * (int32_t)f->word1 + 31;
-    int32_t c0 = umb_pixel_floor(low - UMB_PIXEL_SLACK), c1 = umb_pixel_floor(high + UMB_PIXEL_SLACK);
+    int32_t c0 = umb_pixel_floor(low - UMB_PIXEL_SLACK),
+            c1 = umb_pixel_floor(high + UMB_PIXEL_SLACK);
     if (c0 > last || c1 < first) {
         return;
     }
@@ -120,8 +121,10 @@ static void end_row(umb_fill *f, const steep_edge *s, uint32_t r)
 {
     double low = s->x_min, high = s->x_max;
     if (!s->flat) {
-        double ya = clamp(r - s->error, s->y_min, s->y_max), yb = clamp(r + 1 + s->error, s->y_min, s->y_max);
-        double xa = s->x_top + (ya - s->y_min) * s->slope, xb = s->x_top + (yb - s->y_min) * s->slope;
+        double ya = clamp(r - s->error, s->y_min, s->y_max),
+               yb = clamp(r + 1 + s->error, s->y_min, s->y_max);
+        double xa = s->x_top + (ya - s->y_min) * s->slope,
+               xb = s->x_top + (yb - s->y_min) * s->slope;
         low = clamp(xa < xb ? xa : xb, s->x_min, s->x_max);
         high = clamp(xa < xb ? xb : xa, s->x_min, s->x_max);
     }
@@ -145,7 +148,8 @@ void umb_fill_edge(umb_fill *f, const umb_outline_edge *e)
     /* Rows that lie wholly between the ends, grown by the error, need no cutting at the ends:
      *   x over [r - error, r + 1 + error] runs from x(r) - |slope| error to x(r) + slope + |slope| error. */
     double grown = fabs(s.slope) * s.error + s.error;
-    double left = (s.slope < 0.0 ? s.slope : 0.0) - grown, right = (s.slope > 0.0 ? s.slope : 0.0) + grown;
+    double left = (s.slope < 0.0 ? s.slope : 0.0) - grown,
+           right = (s.slope > 0.0 ? s.slope : 0.0) + grown;
     for (uint32_t r = first; r <= last; ++r) {
         if (s.flat || r - s.error < s.y_min || r + 1 + s.error > s.y_max) {
             end_row(f, &s, r);

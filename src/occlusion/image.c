@@ -10,8 +10,10 @@ umb_image umb_image_of_bounds(const umb_raster_map *map, const umb_image_bounds 
         return image;
     }
     int32_t x_last = (int32_t)map->width - 1, y_last = (int32_t)map->height - 1;
-    int32_t x0 = umb_pixel_floor(b->x_min - UMB_PIXEL_SLACK), x1 = umb_pixel_floor(b->x_max + UMB_PIXEL_SLACK);
-    int32_t y0 = umb_pixel_floor(b->y_min - UMB_PIXEL_SLACK), y1 = umb_pixel_floor(b->y_max + UMB_PIXEL_SLACK);
+    int32_t x0 = umb_pixel_floor(b->x_min - UMB_PIXEL_SLACK),
+            x1 = umb_pixel_floor(b->x_max + UMB_PIXEL_SLACK);
+    int32_t y0 = umb_pixel_floor(b->y_min - UMB_PIXEL_SLACK),
+            y1 = umb_pixel_floor(b->y_max + UMB_PIXEL_SLACK);
     x0 = x0 < 0 ? 0 : x0 > x_last ? x_last : x0;
     y0 = y0 < 0 ? 0 : y0 > y_last ? y_last : y0;
     x1 = x1 < x0 ? x0 : x1 > x_last ? x_last : x1;
@@ -25,15 +27,15 @@ umb_image umb_image_of_bounds(const umb_raster_map *map, const umb_image_bounds 
     return image;
 }
 
-/* A box under a transform as the view sees it: its middle, and half of each of its three edges. A corner is
- * the middle with each half edge added or taken off. With fewer than 16 roundings to each coordinate, each
- * relative to a term whose sum over the box is bounded by reach (times the map's scale), 16 units of that
- * cover them. */
+/* A box under a transform as the view sees it: its middle, and half of each of its three edges. A
+ * corner is the middle with each half edge added or taken off. With fewer than 16 roundings to each
+ * coordinate, each relative to a term whose sum over the box is bounded by reach (times the map's
+ * scale), 16 units of that cover them. */
 typedef struct turned_box {
     umb_view_point middle;
     umb_view_point half[3];
     double reach; /* at least the sum of absolute components of d at every corner */
-    double slop;  /* each vertex in the box has its world vertex within this, per axis, of its exact image */
+    double slop; /* each vertex in the box has its world vertex within this, per axis, of its exact image */
 } turned_box;
 
 static umb_view_point see(const umb_raster_map *map, const double d[3])
@@ -44,7 +46,8 @@ static umb_view_point see(const umb_raster_map *map, const double d[3])
     return p;
 }
 
-static turned_box turn_box(const umb_raster_map *map, const umb_aabb *box, const umb_transform *t, bool identity)
+static turned_box turn_box(const umb_raster_map *map, const umb_aabb *box, const umb_transform *t,
+                           bool identity)
 {
     const double eye[3] = {map->eye.x, map->eye.y, map->eye.z};
     double middle[3], half[3], far_corner[3];
@@ -72,7 +75,8 @@ static turned_box turn_box(const umb_raster_map *map, const umb_aabb *box, const
         r.slop = 0x1p-23 * size > r.slop ? 0x1p-23 * size : r.slop;
     }
     r.middle = see(map, d);
-    /* Rounding of the world coordinate itself is relative to its terms, which slop has the sum of. */
+    /* Rounding of the world coordinate itself is relative to its terms, which slop has the sum
+     * of. */
     r.reach = r.middle.reach + 0x1p24 * r.slop;
     for (int j = 0; j < 3; ++j) {
         r.half[j] = see(map, edge[j]);
@@ -116,8 +120,8 @@ static double side_value(const umb_raster_map *m, int side, const umb_view_point
     }
 }
 
-/* How far outside a computed point may lie when the true one does not: 64 units of what its error is
- * relative to. */
+/* How far outside a computed point may lie when the true one does not: 64 units of what its error
+ * is relative to. */
 static double side_slack(const umb_raster_map *m, int side, double reach)
 {
     if (side < 2) {
@@ -127,8 +131,8 @@ static double side_slack(const umb_raster_map *m, int side, double reach)
     return 64.0 * UMB_U * (m->scale * reach + across * (m->orthographic ? 1.0 : reach));
 }
 
-/* True if the box lies beyond one of the raster's borders. What lies beyond near is tested by its image
- * instead, which is cheaper. */
+/* True if the box lies beyond one of the raster's borders. What lies beyond near is tested by its
+ * image instead, which is cheaper. */
 static bool box_beside(const umb_raster_map *map, const turned_box *box)
 {
     double across = map->scale + fabs(map->cx) + fabs(map->cy) + map->width + map->height;
@@ -147,7 +151,8 @@ static bool box_beside(const umb_raster_map *map, const turned_box *box)
 }
 
 umb_depth_place umb_image_of_part(const umb_raster_map *map, const umb_aabb *part,
-                                  const umb_transform *transform, bool identity, umb_image_bounds *out)
+                                  const umb_transform *transform, bool identity,
+                                  umb_image_bounds *out)
 {
     turned_box box = turn_box(map, part, transform, identity);
     double deep = fabs(box.half[0].w) + fabs(box.half[1].w) + fabs(box.half[2].w);
@@ -210,7 +215,8 @@ static void bound_nearness(const umb_raster_map *map, const float corner[3], con
 }
 
 umb_depth_place umb_outline_of_triangle(const umb_raster_map *map, const float corner[3][3],
-                                        const umb_face *face, umb_outline *outline, umb_image_bounds *out)
+                                        const umb_face *face, umb_outline *outline,
+                                        umb_image_bounds *out)
 {
     umb_view_point polygon[2][3 + SIDES];
     double reach = 0.0;
@@ -223,7 +229,8 @@ umb_depth_place umb_outline_of_triangle(const umb_raster_map *map, const float c
         if (side == 1 && isinf(map->far_depth)) {
             continue;
         }
-        count = cut_polygon(map, side, side_slack(map, side, reach), polygon[now], count, polygon[1 - now]);
+        count = cut_polygon(map, side, side_slack(map, side, reach), polygon[now], count,
+                            polygon[1 - now]);
         now = 1 - now;
     }
     if (count == 0) {

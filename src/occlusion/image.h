@@ -20,14 +20,14 @@ typedef enum umb_depth_place {
     UMB_DEPTH_BEYOND   /* beyond near everywhere; the image is valid */
 } umb_depth_place;
 
-/* Image of a shape's box under a transform, as the box it is, turned. The transform moves each vertex by
- * one rounding to float; identity: by none. */
+/* Image of a shape's box under a transform, as the box it is, turned. The transform moves each
+ * vertex by one rounding to float; identity: by none. */
 umb_depth_place umb_image_of_part(const umb_raster_map *map, const umb_aabb *part,
                                   const umb_transform *transform, bool identity, umb_image_bounds *out);
 
-/* The outer image of what the view can see of a triangle of world vertices, as the polygon it is: face is
- * the triangle's. It is cut at the near and far depths and at the raster's borders first. CROSSING only where rounding leaves
- * no image; the bounds are valid for BEYOND. */
+/* The outer image of what the view can see of a triangle of world vertices, as the polygon it is:
+ * face is the triangle's. It is cut at the near and far depths and at the raster's borders first.
+ * CROSSING only where rounding leaves no image; the bounds are valid for BEYOND. */
 umb_depth_place umb_outline_of_triangle(const umb_raster_map *map, const float corner[3][3],
                                         const umb_face *face, umb_outline *outline, umb_image_bounds *bounds);
 

@@ -4,8 +4,8 @@
  *   submit       ask about boxes; const, so that batches may be asked from several threads
  *   occlude      add one occluder that the walk has reached
  *
- * Queries carry the box's image on the raster, which the walk computes for its order anyway, and the
- * box's reference in the tree. A verdict HIDDEN is a promise; anything else is none.
+ * Queries carry the box's image on the raster, which the walk computes for its order anyway, and
+ * the box's reference in the tree. A verdict HIDDEN is a promise; anything else is none.
  */
 #ifndef UMB_METHOD_H
 #define UMB_METHOD_H

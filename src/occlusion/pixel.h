@@ -4,11 +4,12 @@
 
 #include <stdint.h>
 
-/* Rasters are at most 8192 wide and high; pixel coordinates are cut to somewhat more on both sides. */
+/* Rasters are at most 8192 wide and high; pixel coordinates are cut to somewhat more on both
+ * sides. */
 #define UMB_PIXEL_FAR 16384.0
 
-/* Largest whole number not above v, or the next one when v is within 2^-37 below that: a conversion in
- * place of a call of floor. v is cut first; NaN does not occur. */
+/* Largest whole number not above v, or the next one when v is within 2^-37 below that: a conversion
+ * in place of a call of floor. v is cut first; NaN does not occur. */
 static inline int32_t umb_pixel_floor(double v)
 {
     v = v > -UMB_PIXEL_FAR ? v : -UMB_PIXEL_FAR;

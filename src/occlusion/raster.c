@@ -1,6 +1,7 @@
-/* The strict silhouette raster, after the incremental occlusion maps of Gummerus 5.5: each occluder's
- * silhouette is filled into a window of its own, its depth bounded a sub-tile at a time, and the result
- * merged into one buffer of covered pixels. docs/conservative.md proves that nothing seen is hidden. */
+/* The strict silhouette raster, after the incremental occlusion maps of Gummerus 5.5: each
+ * occluder's silhouette is filled into a window of its own, its depth bounded a sub-tile at a time,
+ * and the result merged into one buffer of covered pixels. docs/conservative.md proves that nothing
+ * seen is hidden. */
 #include <string.h>
 
 #include "base/memory.h"
@@ -63,8 +64,8 @@ static bool reserve_window(raster *r)
     }
     memset(r->window + before, 0, (r->window_capacity - before) * sizeof *r->window);
     return umb_memory_reserve(&r->allocator, (void **)&r->wanted, &r->wanted_capacity, tiles, 1) &&
-           umb_memory_reserve(&r->allocator, (void **)&r->row, &r->row_capacity, r->coverage.columns,
-                              sizeof *r->row);
+           umb_memory_reserve(&r->allocator, (void **)&r->row, &r->row_capacity,
+                              r->coverage.columns, sizeof *r->row);
 }
 
 static bool reserve_silhouette(raster *r, const umb_committed *scene)
@@ -100,7 +101,8 @@ static umb_result prepare(void *state, const umb_raster_map *map, const umb_comm
     return UMB_OK;
 }
 
-static void submit(const void *state, const umb_query *queries, uint32_t count, umb_verdict *verdicts)
+static void submit(const void *state, const umb_query *queries, uint32_t count,
+                   umb_verdict *verdicts)
 {
     const raster *r = state;
     for (uint32_t i = 0; i < count; ++i) {
@@ -120,7 +122,8 @@ static bool open_at(const void *state, double x, double y, double nearness)
         return false;
     }
     uint32_t column = (uint32_t)x, row = (uint32_t)y;
-    const umb_tile *t = &c->tiles[(size_t)(row / UMB_TILE_HEIGHT) * c->columns + column / UMB_TILE_WIDTH];
+    const umb_tile
+        *t = &c->tiles[(size_t)(row / UMB_TILE_HEIGHT) * c->columns + column / UMB_TILE_WIDTH];
     uint32_t r = row % UMB_TILE_HEIGHT, bit = column % UMB_TILE_WIDTH;
     return (t->mask[r] >> bit & 1u) == 0 || t->z[4 * (r / 4) + bit / 8] < nearness;
 }
@@ -150,7 +153,8 @@ static window window_of(const raster *r, double x_min, double y_min, double x_ma
     return w;
 }
 
-/* Rows of covered pixels into tiles; clamped pixels beyond the raster's right border are cut off. */
+/* Rows of covered pixels into tiles; clamped pixels beyond the raster's right border are cut
+ * off. */
 static void gather_tiles(raster *r, const window *w)
 {
     uint32_t last = r->map.width - 1;
@@ -167,8 +171,8 @@ static void gather_tiles(raster *r, const window *w)
     }
 }
 
-/* Which sub-tiles of a tile an occluder changes: it covers pixels there that were open, or may cover closed
- * ones from nearer. Its pixels in the others are dropped. */
+/* Which sub-tiles of a tile an occluder changes: it covers pixels there that were open, or may
+ * cover closed ones from nearer. Its pixels in the others are dropped. */
 static uint8_t want_tile(const umb_tile *tile, uint32_t mask[UMB_TILE_HEIGHT], double most)
 {
     uint32_t bits[2] = {0, 0}, fresh[2] = {0, 0}, keep[2] = {0, 0};
@@ -212,8 +216,9 @@ static bool want_tiles(raster *r, const window *w)
     return any;
 }
 
-/* Least nearness of a triangle over a sub-tile: its plane at the corner where it is farthest, or its
- * farthest vertex where that is nearer. The loss of 2^-21 covers the plane's 2^-22 and the float. */
+/* Least nearness of a triangle over a sub-tile: its plane at the corner where it is farthest, or
+ * its farthest vertex where that is nearer. The loss of 2^-21 covers the plane's 2^-22 and the
+ * float. */
 static float farthest_in(const umb_depth_triangle *t, double x, double y)
 {
     double gx = t->gx < 0.0 ? t->gx * 8.0 : 0.0, gy = t->gy < 0.0 ? t->gy * 4.0 : 0.0;
@@ -222,14 +227,11 @@ static float farthest_in(const umb_depth_triangle *t, double x, double y)
     return (float)(z - 0x1p-21 * fabs(z));
 }
 
-typedef enum overlap {
-    BESIDE,
-    TOUCHES,
-    HOLDS
-} overlap;
+typedef enum overlap { BESIDE, TOUCHES, HOLDS } overlap;
 
 /* How a triangle's image lies to a closed rectangle of the raster, as far as its sides tell. */
-static overlap place_rect(const umb_depth_triangle *t, double x, double y, double width, double height)
+static overlap place_rect(const umb_depth_triangle *t, double x, double y, double width,
+                          double height)
 {
     bool holds = t->side_count > 0;
     for (uint32_t i = 0; i < t->side_count; ++i) {
@@ -245,16 +247,18 @@ static overlap place_rect(const umb_depth_triangle *t, double x, double y, doubl
     return holds ? HOLDS : TOUCHES;
 }
 
-/* First and last of count sub-tiles of a size, from an origin, that [low, high] meets; ends clamped. */
-static void sub_tile_range(double low, double high, double origin, double size, int count, int *first, int *last)
+/* First and last of count sub-tiles of a size, from an origin, that [low, high] meets; ends
+ * clamped. */
+static void sub_tile_range(double low, double high, double origin, double size, int count,
+                           int *first, int *last)
 {
     double f = (low - origin) / size - 1e-9, l = (high - origin) / size + 1e-9;
     *first = f > 0.0 ? (int)f : 0;
     *last = l < count ? (int)l : count - 1;
 }
 
-/* All that touch a sub-tile bound its depth together, from the farthest; one that holds all of it does so
- * alone, however far the others are. */
+/* All that touch a sub-tile bound its depth together, from the farthest; one that holds all of it
+ * does so alone, however far the others are. */
 static void lower_tile(window_tile *tile, uint8_t wanted, const umb_front_triangle *front,
                        const umb_depth_triangle *t, uint32_t tx, uint32_t ty)
 {

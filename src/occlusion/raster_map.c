@@ -30,7 +30,8 @@ void umb_raster_map_prepare(umb_raster_map *map, const umb_view *view)
     map->scale = x_scale > y_scale ? x_scale : y_scale;
     map->scale *= 1.0 + 0x1p-18; /* axes are of unit length to within 1e-6 */
 
-    /* Inverse of the rows: the columns of adj / det. For unit axes it is the axes themselves, scaled. */
+    /* Inverse of the rows: the columns of adj / det. For unit axes it is the axes themselves,
+     * scaled. */
     umb_vec3 yw = umb_vec3_cross(map->y, map->w), wx = umb_vec3_cross(map->w, map->x);
     umb_vec3 xy = umb_vec3_cross(map->x, map->y);
     double det = umb_vec3_dot(map->x, yw);

@@ -4,9 +4,10 @@
  *   perspective   pixel = (X / W + cx, Y / W + cy)      nearness = 1 / W
  *   parallel      pixel = (X + cx, Y + cy)              nearness = -W
  *
- * x and y are in pixels (y grows downwards), w is the view's forward. The coefficients are taken as they
- * are: any invertible rows make a valid raster, because planes through the eye are lines on it and W
- * orders the points of a sight-line. So only the evaluation has an error (docs/conservative.md, 3).
+ * x and y are in pixels (y grows downwards), w is the view's forward. The coefficients are taken as
+ * they are: any invertible rows make a valid raster, because planes through the eye are lines on it
+ * and W orders the points of a sight-line. So only the evaluation has an error
+ * (docs/conservative.md, 3).
  */
 #ifndef UMB_RASTER_MAP_H
 #define UMB_RASTER_MAP_H
@@ -31,12 +32,12 @@ typedef struct umb_raster_map {
     uint32_t width, height;
 } umb_raster_map;
 
-/* Lay a raster over a view. The raster reaches a little beyond the frustum (2^-31 of its largest slope), so that
- * rounding never leaves a part of the frustum without a pixel. */
+/* Lay a raster over a view. The raster reaches a little beyond the frustum (2^-31 of its largest
+ * slope), so that rounding never leaves a part of the frustum without a pixel. */
 void umb_raster_map_prepare(umb_raster_map *map, const umb_view *view);
 
-/* A point on the raster. error bounds the distance to the true image in each coordinate; reach is the
- * sum of absolute components of d. */
+/* A point on the raster. error bounds the distance to the true image in each coordinate; reach is
+ * the sum of absolute components of d. */
 typedef struct umb_raster_point {
     double x, y, w;
     double error, reach;
@@ -58,8 +59,9 @@ static inline umb_view_point umb_raster_map_point(const umb_raster_map *m, const
     return v;
 }
 
-/* Divide. v.w is at least the near depth in perspective. slack is the number of units 2^-53 that each of
- * x, y, w may be off, relative to scale * reach (w: reach); 5 for a vertex, more for cut points.
+/* Divide. v.w is at least the near depth in perspective. slack is the number of units 2^-53 that
+ * each of x, y, w may be off, relative to scale * reach (w: reach); 5 for a vertex, more for cut
+ * points.
  *
  * Perspective, with a = |X/W|: |fl - true| <= slack u (reach/W)(scale + a) + 3u (a + |cx|) and the same for
  * y; the factor 2 below also covers 1/(1 - slack u reach/W), as long as that quotient is below 1/2, which

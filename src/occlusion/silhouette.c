@@ -6,8 +6,8 @@
 #include "geometry/transform.h"
 #include "plane.h"
 
-/* Slack, in units 2^-53 of scale * reach: a vertex has one subtraction, one product and two sums in each
- * term; a cut adds the interpolation of two vertices. */
+/* Slack, in units 2^-53 of scale * reach: a vertex has one subtraction, one product and two sums in
+ * each term; a cut adds the interpolation of two vertices. */
 #define VERTEX_SLACK 5.0
 #define CUT_SLACK 16.0
 
@@ -39,8 +39,8 @@ void umb_silhouette_free(umb_silhouette *s, const umb_allocator *a)
     memset(s, 0, sizeof *s);
 }
 
-/* World, view and raster position of every vertex. The near cut is placed 64 units of the mesh's reach
- * beyond the near depth: then what is kept, rounding included, is truly beyond it. */
+/* World, view and raster position of every vertex. The near cut is placed 64 units of the mesh's
+ * reach beyond the near depth: then what is kept, rounding included, is truly beyond it. */
 static bool place_vertices(umb_silhouette *s, const umb_raster_map *map, const umb_occluder *o)
 {
     const umb_mesh *mesh = o->mesh;
@@ -80,8 +80,8 @@ static double vertex_nearness(const umb_raster_map *map, umb_view_point v)
     return map->orthographic ? -(w + 4.0 * UMB_U * fabs(w)) : (1.0 - 4.0 * UMB_U) / w;
 }
 
-/* Where an edge meets the cut depth. Operands are in one order whatever the edge's direction, so that a
- * triangle's chord and its neighbour's cut edge end in the same point to the bit. */
+/* Where an edge meets the cut depth. Operands are in one order whatever the edge's direction, so
+ * that a triangle's chord and its neighbour's cut edge end in the same point to the bit. */
 static umb_raster_point cut_edge(const umb_silhouette *s, const umb_raster_map *map, uint32_t kept,
                                  uint32_t lost)
 {
@@ -167,11 +167,14 @@ static float float_up(double v)
     return -float_down(-v);
 }
 
-/* The three sides of an image, turned inwards. With ends off by an error each and rounding of a few units,
- * the value at a raster point is off by at most the error times twice the lengths involved, doubled. */
-static void find_sides(umb_depth_triangle *t, const umb_raster_map *map, const umb_raster_point *const p[3])
+/* The three sides of an image, turned inwards. With ends off by an error each and rounding of a few
+ * units, the value at a raster point is off by at most the error times twice the lengths involved,
+ * doubled. */
+static void find_sides(umb_depth_triangle *t, const umb_raster_map *map,
+                       const umb_raster_point *const p[3])
 {
-    double area = (p[1]->x - p[0]->x) * (p[2]->y - p[0]->y) - (p[1]->y - p[0]->y) * (p[2]->x - p[0]->x);
+    double area = (p[1]->x - p[0]->x) * (p[2]->y - p[0]->y) -
+                  (p[1]->y - p[0]->y) * (p[2]->x - p[0]->x);
     double turn = area < 0.0 ? -1.0 : 1.0;
     double raster = (double)map->width + map->height;
     t->side_count = 3;
@@ -187,8 +190,8 @@ static void find_sides(umb_depth_triangle *t, const umb_raster_map *map, const u
     }
 }
 
-void umb_silhouette_depth(const umb_silhouette *s, const umb_raster_map *map, const umb_front_triangle *front,
-                          umb_depth_triangle *out)
+void umb_silhouette_depth(const umb_silhouette *s, const umb_raster_map *map,
+                          const umb_front_triangle *front, umb_depth_triangle *out)
 {
     const uint32_t *corner = front->corner;
     umb_plane_nearness plane = {0.0, 0.0, front->least, 0.0};

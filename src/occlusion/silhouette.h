@@ -2,9 +2,10 @@
  *
  * The front set F holds the triangles that certainly block as seen from the eye (facing it, or
  * two-sided), cut at the near depth. All are turned to project with one orientation, so the winding
- * number of the boundary of F about a raster point is the number of triangles of F over it, and edges
- * between two triangles of F cancel: no cracks, holes and folds included (Gummerus 5.5 fills silhouettes
- * of convex shapes; this is the same for any mesh). Leaving a triangle out of F is always safe.
+ * number of the boundary of F about a raster point is the number of triangles of F over it, and
+ * edges between two triangles of F cancel: no cracks, holes and folds included (Gummerus 5.5 fills
+ * silhouettes of convex shapes; this is the same for any mesh). Leaving a triangle out of F is
+ * always safe.
  */
 #ifndef UMB_SILHOUETTE_H
 #define UMB_SILHOUETTE_H

@@ -3,7 +3,8 @@
 bool umb_ids_reserve(umb_ids *ids, const umb_allocator *allocator)
 {
     size_t need = (size_t)ids->used + 1;
-    return umb_memory_reserve(allocator, (void **)&ids->heap, &ids->heap_capacity, need, sizeof *ids->heap) &&
+    return umb_memory_reserve(allocator, (void **)&ids->heap, &ids->heap_capacity, need,
+                              sizeof *ids->heap) &&
            umb_memory_reserve(allocator, (void **)&ids->released, &ids->released_capacity, need,
                               sizeof *ids->released);
 }

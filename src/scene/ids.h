@@ -1,5 +1,5 @@
-/* Dense ids from 0. One that is released is given out again, lowest first, once the release has been
- * committed: until then readers of the committed state may still mean the old owner by it. */
+/* Dense ids from 0. One that is released is given out again, lowest first, once the release has
+ * been committed: until then readers of the committed state may still mean the old owner by it. */
 #ifndef UMB_IDS_H
 #define UMB_IDS_H
 

@@ -17,8 +17,8 @@
 typedef struct mesh_builder {
     const umb_shape_def *def;
     uint32_t stride, triangle_count;
-    uint32_t *merged;         /* per position of the definition: its vertex, or UMB_NONE */
-    uint32_t *table;          /* hash table of vertices, UMB_NONE where empty */
+    uint32_t *merged; /* per position of the definition: its vertex, or UMB_NONE */
+    uint32_t *table;  /* hash table of vertices, UMB_NONE where empty */
     uint32_t table_mask;
     float (*positions)[3];
     uint32_t position_count, block_position_count;
@@ -37,8 +37,8 @@ static void read_position(const mesh_builder *b, uint32_t i, float out[3])
 
 static umb_result check_def(const umb_shape_def *def)
 {
-    if (def == NULL || def->positions == NULL || def->position_count == 0 || def->index_count % 3 != 0 ||
-        (def->indices == NULL && def->index_count > 0) ||
+    if (def == NULL || def->positions == NULL || def->position_count == 0 ||
+        def->index_count % 3 != 0 || (def->indices == NULL && def->index_count > 0) ||
         (def->position_stride != 0 && def->position_stride < 3 * sizeof(float))) {
         return UMB_ERROR_ARGUMENT;
     }
@@ -228,7 +228,8 @@ static umb_mesh *pack(const umb_allocator *allocator, const mesh_builder *b, con
 /* A box of twelve triangles stays one part; what is open or bent is cut down to pairs. */
 static const umb_parts_rule PARTS = {2, 12};
 
-static umb_result create(const umb_allocator *allocator, const umb_shape_def *def, bool one_part, umb_mesh **out)
+static umb_result create(const umb_allocator *allocator, const umb_shape_def *def, bool one_part,
+                         umb_mesh **out)
 {
     *out = NULL;
     umb_result result = check_def(def);
@@ -247,8 +248,8 @@ static umb_result create(const umb_allocator *allocator, const umb_shape_def *de
         umb_scratch_drop(&scratch, b.table);
         uint32_t edge_count = 0, part_count = 1;
         const uint32_t(*triangles)[3] = (const uint32_t(*)[3])b.triangles;
-        umb_edge *edges =
-            umb_mesh_edges_build(&scratch, triangles, b.two_sided, b.blocking_count, &edge_count);
+        umb_edge *edges = umb_mesh_edges_build(&scratch, triangles, b.two_sided, b.blocking_count,
+                                               &edge_count);
         umb_part whole = {bounds_of((const float(*)[3])b.positions, b.position_count), 1, 0,
                           b.triangle_count};
         const umb_part *parts = &whole;
@@ -270,7 +271,8 @@ umb_result umb_mesh_create(const umb_allocator *allocator, const umb_shape_def *
     return create(allocator, def, false, out);
 }
 
-umb_result umb_mesh_create_occluder(const umb_allocator *allocator, const umb_shape_def *def, umb_mesh **out)
+umb_result umb_mesh_create_occluder(const umb_allocator *allocator, const umb_shape_def *def,
+                                    umb_mesh **out)
 {
     return create(allocator, def, true, out);
 }
@@ -282,8 +284,8 @@ void umb_mesh_destroy(const umb_allocator *allocator, umb_mesh *mesh)
     }
 }
 
-/* True if each row looks at one axis at most: then rounding keeps order along it, and the image of the
- * box's corners is exactly the box of the images. */
+/* True if each row looks at one axis at most: then rounding keeps order along it, and the image of
+ * the box's corners is exactly the box of the images. */
 static bool keeps_boxes(const umb_transform *t)
 {
     for (int i = 0; i < 3; ++i) {
@@ -294,7 +296,8 @@ static bool keeps_boxes(const umb_transform *t)
     return true;
 }
 
-umb_aabb umb_mesh_world_bounds(const umb_mesh *mesh, const umb_transform *transform, bool blocking_only)
+umb_aabb umb_mesh_world_bounds(const umb_mesh *mesh, const umb_transform *transform,
+                               bool blocking_only)
 {
     const umb_aabb *own = blocking_only ? &mesh->block_bounds : &mesh->bounds;
     if (umb_transform_is_identity(transform)) {

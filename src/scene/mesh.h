@@ -1,14 +1,16 @@
-/* A mesh: the triangles of a shape or of a welded occluder, with what the silhouette needs. Immutable. */
+/* A mesh: the triangles of a shape or of a welded occluder, with what the silhouette needs.
+ * Immutable. */
 #ifndef UMB_MESH_H
 #define UMB_MESH_H
 
 #include "umbrage/scene.h"
 
-/* An edge between blocking triangles. f0 runs v0 -> v1. f1 runs v1 -> v0, unless UMB_EDGE_SAME is set
- * in it, then v0 -> v1 too; UMB_NONE: no second triangle. A non-manifold edge is several of these: with
- * s(f) = +1 for a triangle seen from its front, -1 for a two-sided one seen from behind, 0 for one that
- * does not block now, the net multiplicity of v0 -> v1 in the boundary of the front set is
- * s(f0) - s(f1), or s(f0) + s(f1) when SAME, summed over the entries, which follow one another. */
+/* An edge between blocking triangles. f0 runs v0 -> v1. f1 runs v1 -> v0, unless UMB_EDGE_SAME is
+ * set in it, then v0 -> v1 too; UMB_NONE: no second triangle. A non-manifold edge is several of
+ * these: with s(f) = +1 for a triangle seen from its front, -1 for a two-sided one seen from
+ * behind, 0 for one that does not block now, the net multiplicity of v0 -> v1 in the boundary of
+ * the front set is s(f0) - s(f1), or s(f0) + s(f1) when SAME, summed over the entries, which follow
+ * one another. */
 typedef struct umb_edge {
     uint32_t v0, v1;
     uint32_t f0, f1;
@@ -16,8 +18,9 @@ typedef struct umb_edge {
 
 #define UMB_EDGE_SAME 0x80000000u
 
-/* A tree of boxes in the order of a walk: the part at 0 holds all triangles; the part after part i is the
- * first that i was cut into, unless that is skip, where the walk goes on when i is passed over. */
+/* A tree of boxes in the order of a walk: the part at 0 holds all triangles; the part after part i
+ * is the first that i was cut into, unless that is skip, where the walk goes on when i is passed
+ * over. */
 typedef struct umb_part {
     umb_aabb box;
     uint32_t skip; /* own number + 1: a leaf */
@@ -41,16 +44,17 @@ typedef struct umb_mesh {
     size_t bytes;             /* of the one block that holds the mesh and its arrays */
 } umb_mesh;
 
-/* Build a mesh. Vertices are the same where their positions are exactly equal (-0 is 0): files split
- * vertices for normals and colours, and a split is no crack. Positions no triangle uses are left out
- * (unless there is no triangle at all). Errors: the rules of umb_shape_def, no memory. */
+/* Build a mesh. Vertices are the same where their positions are exactly equal (-0 is 0): files
+ * split vertices for normals and colours, and a split is no crack. Positions no triangle uses are
+ * left out (unless there is no triangle at all). Errors: the rules of umb_shape_def, no memory. */
 umb_result umb_mesh_create(const umb_allocator *allocator, const umb_shape_def *def, umb_mesh **out);
-/* The same with a single part: for occluders that stand alone, which have no object's bounds to refine. */
+/* The same with a single part: for occluders that stand alone, which have no object's bounds to
+ * refine. */
 umb_result umb_mesh_create_occluder(const umb_allocator *allocator, const umb_shape_def *def, umb_mesh **out);
 void umb_mesh_destroy(const umb_allocator *allocator, umb_mesh *mesh);
 
-/* Lay out the arrays of an empty mesh in one block, for those who fill it in themselves: the counts of
- * sizes say how long each is. NULL when there is no memory. */
+/* Lay out the arrays of an empty mesh in one block, for those who fill it in themselves: the counts
+ * of sizes say how long each is. NULL when there is no memory. */
 umb_mesh *umb_mesh_allocate(const umb_allocator *allocator, const umb_mesh *sizes);
 
 /* Box of positions [0, count) of the mesh under a transform, of the world vertices themselves. The

@@ -39,9 +39,9 @@ static void add_edge(edges_builder *b, uint32_t first, uint32_t f1)
     b->used[first] = 1;
 }
 
-/* The best partner that runs the other way: not the same triangle turned over if there is another (such
- * a pair would tie a solid to its neighbour instead of to itself), else the nearest in the file, which
- * is likely of the same solid. */
+/* The best partner that runs the other way: not the same triangle turned over if there is another
+ * (such a pair would tie a solid to its neighbour instead of to itself), else the nearest in the
+ * file, which is likely of the same solid. */
 static uint32_t find_opposite(const edges_builder *b, uint32_t i, uint32_t begin, uint32_t end)
 {
     uint32_t best = UMB_NONE, best_distance = 0;
@@ -53,7 +53,8 @@ static uint32_t find_opposite(const edges_builder *b, uint32_t i, uint32_t begin
         bool turned = third_of(b, j) == third_of(b, i);
         uint32_t f = b->halves[i] / 3, g = b->halves[j] / 3;
         uint32_t distance = f < g ? g - f : f - g;
-        if (best == UMB_NONE || (best_turned && !turned) || (best_turned == turned && distance < best_distance)) {
+        if (best == UMB_NONE || (best_turned && !turned) ||
+            (best_turned == turned && distance < best_distance)) {
             best = j;
             best_distance = distance;
             best_turned = turned;
@@ -80,8 +81,8 @@ static void pair_opposite_in_order(edges_builder *b, uint32_t begin, uint32_t en
     }
 }
 
-/* What has no opposite all runs one way. Two of these can still cancel when one is seen from behind,
- * which takes a two-sided one. */
+/* What has no opposite all runs one way. Two of these can still cancel when one is seen from
+ * behind, which takes a two-sided one. */
 static void pair_same(edges_builder *b, uint32_t begin, uint32_t end)
 {
     uint32_t waiting = UMB_NONE;
@@ -126,8 +127,9 @@ static void pair_group(edges_builder *b, uint32_t begin, uint32_t end)
     pair_same(b, begin, end);
 }
 
-umb_edge *umb_mesh_edges_build(umb_scratch *scratch, const uint32_t (*triangles)[3], const uint8_t *two_sided,
-                               uint32_t triangle_count, uint32_t *edge_count)
+umb_edge *umb_mesh_edges_build(umb_scratch *scratch, const uint32_t (*triangles)[3],
+                               const uint8_t *two_sided, uint32_t triangle_count,
+                               uint32_t *edge_count)
 {
     size_t n = (size_t)triangle_count * 3;
     uint64_t *keys = umb_scratch_get(scratch, n, sizeof *keys);

@@ -5,7 +5,7 @@
 #include "base/sort.h"
 
 #define BINS 16u
-#define KEEP_BELOW 0.8 /* parts must be this much smaller than what they refine */
+#define KEEP_BELOW 0.8  /* parts must be this much smaller than what they refine */
 #define STACK_SIZE 256u /* each cut leaves at most 7/8: 8/7^256 is far beyond 2^32 */
 
 typedef struct parts_builder {
@@ -44,9 +44,10 @@ static float middle(const umb_aabb *b, int axis)
     return 0.5f * b->min[axis] + 0.5f * b->max[axis];
 }
 
-/* Where the binned surface-area cost is least: number of bins on the left, 0 if no cut leaves enough
- * on both sides. */
-static uint32_t best_cut(const parts_builder *p, uint32_t begin, uint32_t end, int axis, float low, double scale)
+/* Where the binned surface-area cost is least: number of bins on the left, 0 if no cut leaves
+ * enough on both sides. */
+static uint32_t best_cut(const parts_builder *p, uint32_t begin, uint32_t end, int axis, float low,
+                         double scale)
 {
     umb_aabb boxes[BINS], right[BINS];
     uint32_t counts[BINS] = {0};
@@ -131,7 +132,8 @@ static void emit(parts_builder *p, uint32_t begin, uint32_t end)
     p->parts[p->part_count++].box = box;
 }
 
-/* Where the walk goes on when a part is passed over: the next one that does not lie inside its range. */
+/* Where the walk goes on when a part is passed over: the next one that does not lie inside its
+ * range. */
 static void link_parts(parts_builder *p)
 {
     uint32_t open[STACK_SIZE], depth = 0;
@@ -146,9 +148,10 @@ static void link_parts(parts_builder *p)
     }
 }
 
-/* Drop what is below a small part unless its own parts together are smaller: the boxes of a solid's faces
- * say no more than the solid's box, those of a room's walls say much more than the room's. Going backwards,
- * children come before their parents; a negative area marks a part that becomes a leaf. */
+/* Drop what is below a small part unless its own parts together are smaller: the boxes of a solid's
+ * faces say no more than the solid's box, those of a room's walls say much more than the room's.
+ * Going backwards, children come before their parents; a negative area marks a part that becomes a
+ * leaf. */
 static void prune_parts(parts_builder *p, double *area, uint32_t most)
 {
     for (uint32_t i = p->part_count; i-- > 0;) {
@@ -193,8 +196,8 @@ static umb_aabb *triangle_boxes(umb_scratch *scratch, const float (*positions)[3
 }
 
 umb_part *umb_mesh_parts_build(umb_scratch *scratch, const float (*positions)[3],
-                               const uint32_t (*triangles)[3], uint32_t triangle_count, umb_parts_rule rule,
-                               uint32_t *part_count, uint32_t **part_order)
+                               const uint32_t (*triangles)[3], uint32_t triangle_count,
+                               umb_parts_rule rule, uint32_t *part_count, uint32_t **part_order)
 {
     umb_aabb *boxes = triangle_boxes(scratch, positions, triangles, triangle_count);
     size_t n = triangle_count;

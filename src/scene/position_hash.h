@@ -1,4 +1,5 @@
-/* Where a position goes in a hash table. Positions are compared by their bits: fold -0 into 0 first. */
+/* Where a position goes in a hash table. Positions are compared by their bits: fold -0 into 0
+ * first. */
 #ifndef UMB_POSITION_HASH_H
 #define UMB_POSITION_HASH_H
 

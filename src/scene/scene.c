@@ -9,7 +9,7 @@
 #include "scene_state.h"
 
 #define MAX_ITEMS (1u << 30) /* an index keeps two bits of an item's number for itself */
-#define OBJECT_FLAGS \
+#define OBJECT_FLAGS                                                                               \
     (UMB_OBJECT_STATIC | UMB_OBJECT_NEVER_HIDES | UMB_OBJECT_IGNORED | UMB_OBJECT_IS_SHAPE)
 
 umb_result umb_scene_fail(const umb_scene *scene, umb_result code, const char *format, ...)
@@ -123,8 +123,9 @@ umb_result umb_scene_add_shape(umb_scene *scene, const umb_shape_def *def, umb_s
     case UMB_ERROR_LIMIT:
         return umb_scene_fail(scene, result, "a shape has more than 2^30 vertices or triangles");
     default:
-        return umb_scene_fail(scene, result,
-                              "a shape needs finite positions and triples of indices below their count");
+        return umb_scene_fail(
+            scene, result,
+            "a shape needs finite positions and triples of indices below their count");
     }
 }
 
@@ -171,7 +172,8 @@ static umb_result place(const umb_scene *scene, umb_shape shape, const umb_trans
     if (mesh != NULL && mesh->triangle_count > 0) {
         p.block_bounds = umb_mesh_world_bounds(mesh, &p.transform, true);
         if (!box_is_finite(&p.block_bounds)) {
-            return umb_scene_fail(scene, UMB_ERROR_ARGUMENT, "a transform moves vertices out of range");
+            return umb_scene_fail(scene, UMB_ERROR_ARGUMENT,
+                                  "a transform moves vertices out of range");
         }
     }
     *out = p;
@@ -179,8 +181,8 @@ static umb_result place(const umb_scene *scene, umb_shape shape, const umb_trans
 }
 
 /* The bounds of an object: those given, or the shape's own. */
-static umb_result choose_bounds(const umb_scene *scene, const umb_placement *placement, const umb_aabb *given,
-                                umb_aabb *out)
+static umb_result choose_bounds(const umb_scene *scene, const umb_placement *placement,
+                                const umb_aabb *given, umb_aabb *out)
 {
     const umb_mesh *mesh = umb_scene_mesh(scene, placement->shape);
     if (given == NULL && mesh == NULL) {
@@ -194,7 +196,8 @@ static umb_result choose_bounds(const umb_scene *scene, const umb_placement *pla
     }
     for (int i = 0; i < 3; ++i) {
         if (!isfinite(box.min[i]) || !isfinite(box.max[i]) || box.min[i] > box.max[i]) {
-            return umb_scene_fail(scene, UMB_ERROR_ARGUMENT, "an object's bounds are not finite or inverted");
+            return umb_scene_fail(scene, UMB_ERROR_ARGUMENT,
+                                  "an object's bounds are not finite or inverted");
         }
     }
     *out = box;
@@ -221,8 +224,8 @@ umb_result umb_scene_add_object(umb_scene *scene, const umb_object_def *def, uin
     }
     size_t need = (size_t)scene->object_ids.used + 1;
     if (!umb_ids_reserve(&scene->object_ids, &scene->allocator) ||
-        !umb_memory_reserve(&scene->allocator, (void **)&scene->objects, &scene->object_capacity, need,
-                            sizeof *scene->objects) ||
+        !umb_memory_reserve(&scene->allocator, (void **)&scene->objects, &scene->object_capacity,
+                            need, sizeof *scene->objects) ||
         !umb_memory_reserve(&scene->allocator, (void **)&scene->moved, &scene->moved_capacity, need,
                             sizeof *scene->moved)) {
         return fail_memory(scene, "an object");
@@ -315,7 +318,8 @@ umb_result umb_scene_add_occluder(umb_scene *scene, umb_shape shape, const umb_t
     }
     const umb_mesh *mesh = umb_scene_mesh(scene, shape);
     if (mesh == NULL || mesh->triangle_count == 0) {
-        return umb_scene_fail(scene, UMB_ERROR_ARGUMENT, "an occluder's shape has nothing that blocks");
+        return umb_scene_fail(scene, UMB_ERROR_ARGUMENT,
+                              "an occluder's shape has nothing that blocks");
     }
     uint32_t id = umb_ids_peek(&scene->occluder_ids);
     if (id >= MAX_ITEMS) {
@@ -361,7 +365,8 @@ const umb_allocator *umb_scene_allocator(const umb_scene *scene)
 
 size_t umb_scene_memory(const umb_scene *scene)
 {
-    size_t bytes = sizeof *scene + umb_ids_memory(&scene->object_ids) + umb_ids_memory(&scene->occluder_ids);
+    size_t bytes = sizeof *scene + umb_ids_memory(&scene->object_ids) +
+                   umb_ids_memory(&scene->occluder_ids);
     bytes += scene->shape_capacity * sizeof *scene->shapes;
     bytes += scene->object_capacity * sizeof *scene->objects;
     bytes += scene->occluder_capacity * sizeof *scene->occluders;

@@ -4,8 +4,8 @@
 
 #include "mesh.h"
 
-/* Something that hides. World vertices are umb_transform_point(transform, position), or the positions
- * themselves when identity is set. */
+/* Something that hides. World vertices are umb_transform_point(transform, position), or the
+ * positions themselves when identity is set. */
 typedef struct umb_occluder {
     const umb_mesh *mesh; /* at least one blocking triangle */
     umb_transform transform;

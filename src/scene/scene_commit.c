@@ -90,15 +90,16 @@ static void fill_stand_alone(umb_scene *scene)
     for (uint32_t i = 0; i < scene->occluder_ids.used; ++i) {
         umb_occluder_slot *slot = &scene->occluders[i];
         if (slot->state == UMB_SLOT_USED) {
-            scene->committed_occluders[c->occluder_count++] = make_occluder(scene, &slot->placement, UMB_NONE);
+            scene->committed_occluders[c->occluder_count++] = make_occluder(scene, &slot->placement,
+                                                                            UMB_NONE);
         } else {
             slot->state = UMB_SLOT_FREE;
         }
     }
 }
 
-/* Write everything anew. Memory is made sure of first: after that nothing can fail, so readers never see
- * half a commit. */
+/* Write everything anew. Memory is made sure of first: after that nothing can fail, so readers
+ * never see half a commit. */
 static umb_result commit_structure(umb_scene *scene)
 {
     uint64_t occluders = count_occluders(scene);

@@ -1,5 +1,5 @@
-/* What a scene is made of, for the files of this room alone. Two states live side by side: the one that
- * calls change, and the one that readers see until the next commit. */
+/* What a scene is made of, for the files of this room alone. Two states live side by side: the one
+ * that calls change, and the one that readers see until the next commit. */
 #ifndef UMB_SCENE_STATE_H
 #define UMB_SCENE_STATE_H
 

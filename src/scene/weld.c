@@ -44,8 +44,8 @@ static uint32_t count_own(const umb_scene *scene)
     return count;
 }
 
-static umb_result weld(umb_scene *scene, umb_weld_soup *soup, umb_scratch *scratch, uint32_t cluster_triangles,
-                       uint32_t ring)
+static umb_result weld(umb_scene *scene, umb_weld_soup *soup, umb_scratch *scratch,
+                       uint32_t cluster_triangles, uint32_t ring)
 {
     umb_result result = umb_weld_soup_collect(soup, scene);
     if (result != UMB_OK) {
@@ -57,8 +57,8 @@ static umb_result weld(umb_scene *scene, umb_weld_soup *soup, umb_scratch *scrat
         !umb_weld_cluster(soup, scratch, cluster_triangles, ring, &groups, &count)) {
         return UMB_ERROR_MEMORY;
     }
-    if (!umb_memory_reserve(&scene->allocator, (void **)&scene->groups, &scene->group_capacity, count,
-                            sizeof *scene->groups)) {
+    if (!umb_memory_reserve(&scene->allocator, (void **)&scene->groups, &scene->group_capacity,
+                            count, sizeof *scene->groups)) {
         for (uint32_t g = 0; g < count; ++g) {
             umb_weld_group_free(&scene->allocator, groups[g]);
         }

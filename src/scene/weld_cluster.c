@@ -1,8 +1,8 @@
 /* Groups of objects that touch, cut into clusters: occluders small enough to be found, ordered and
  * hidden one by one.
  *
- * A cut between clusters P and Q would be a border edge of both, and no pixel that it meets would be
- * covered by either: a crack. So each cluster carries a ring of the triangles around it:
+ * A cut between clusters P and Q would be a border edge of both, and no pixel that it meets would
+ * be covered by either: a crack. So each cluster carries a ring of the triangles around it:
  *
  *      +---+---+---+---+---+---+         P's own triangles are left of the cut, Q's right of it. P with
  *      | P | P |(P)|(Q)| Q | Q |         its ring reaches one triangle further, so does Q. What meets
@@ -10,31 +10,31 @@
  *      +---+---+---+---+---+---+
  *            ring of Q ^ ^ ring of P
  *
- * The ring holds the triangles that share a vertex with the cluster, not only those that share an edge:
- * where the corners of three clusters meet, the corner too must lie inside one occluder, or a pinhole
- * stays there. Every point of the group's surface is then inside some cluster with all the triangles
- * around it. */
+ * The ring holds the triangles that share a vertex with the cluster, not only those that share an
+ * edge: where the corners of three clusters meet, the corner too must lie inside one occluder, or a
+ * pinhole stays there. Every point of the group's surface is then inside some cluster with all the
+ * triangles around it. */
 #include <pthread.h>
 #include <string.h>
 
 #include "mesh_parts.h"
 #include "weld_soup.h"
 
-#define SMALL_GROUP 16u /* groups of up to so many clusters may stay whole; larger ones never do */
-#define RING_LIMIT 512u /* most triangles of a ring: fans */
+#define SMALL_GROUP 16u  /* groups of up to so many clusters may stay whole; larger ones never do */
+#define RING_LIMIT 512u  /* most triangles of a ring: fans */
 #define LEAST_CLUSTER 8u /* smaller ones cost more to draw than they bring nearer */
 
 typedef struct clusterer {
     umb_weld_soup *soup;
     umb_scratch *scratch;
     uint32_t target, ring;
-    uint32_t *group_of;  /* per object, UMB_NONE: hides by its own shape */
-    uint32_t *order;     /* triangles of groups, clusters in a row */
+    uint32_t *group_of; /* per object, UMB_NONE: hides by its own shape */
+    uint32_t *order;    /* triangles of groups, clusters in a row */
     uint32_t order_count;
-    uint32_t *starts;    /* first triangle of each cluster in order */
-    uint32_t *owners;    /* group of each cluster */
+    uint32_t *starts; /* first triangle of each cluster in order */
+    uint32_t *owners; /* group of each cluster */
     uint32_t cluster_count, group_count;
-    uint32_t *lists;     /* triangles of each cluster, its ring at the end */
+    uint32_t *lists; /* triangles of each cluster, its ring at the end */
     size_t list_capacity;
     uint32_t *list_starts;
     uint32_t *vertex_starts, *vertex_triangles; /* triangles around each vertex */
@@ -73,9 +73,8 @@ static bool choose_groups(clusterer *c)
         uint32_t root = umb_weld_soup_root(soup, i);
         if (root != i) {
             c->group_of[i] = c->group_of[root];
-        } else if (triangles[i] > 0 &&
-                   (members[i] > 1 ||
-                    (uint64_t)triangles[i] + soup->merged[i] > (uint64_t)SMALL_GROUP * c->target)) {
+        } else if (triangles[i] > 0 && (members[i] > 1 || (uint64_t)triangles[i] + soup->merged[i] >
+                                                              (uint64_t)SMALL_GROUP * c->target)) {
             c->group_of[i] = c->group_count++;
             c->order_count += triangles[i];
         } else {
@@ -92,9 +91,9 @@ static uint32_t group_of_triangle(const clusterer *c, uint32_t t)
     return c->group_of[c->soup->triangles[t].object];
 }
 
-/* Cut the triangles [begin, end) of one group into clusters: parts, as of an object's shape. A small solid
- * is one cluster; a level's walls become clusters of their own, because an occluder that is there several
- * times along a sight-line is only as near as the farthest. */
+/* Cut the triangles [begin, end) of one group into clusters: parts, as of an object's shape. A
+ * small solid is one cluster; a level's walls become clusters of their own, because an occluder
+ * that is there several times along a sight-line is only as near as the farthest. */
 static bool cut_group(clusterer *c, uint32_t group, uint32_t begin, uint32_t end)
 {
     uint32_t n = end - begin, part_count = 0, *part_order = NULL;
@@ -106,11 +105,12 @@ static bool cut_group(clusterer *c, uint32_t group, uint32_t begin, uint32_t end
     }
     umb_parts_rule rule = {c->target < LEAST_CLUSTER ? c->target : LEAST_CLUSTER,
                            n <= SMALL_GROUP * c->target ? n : c->target};
-    const umb_part *parts =
-        c->scratch->failed ? NULL
-                           : umb_mesh_parts_build(c->scratch, (const float(*)[3])c->soup->positions,
-                                                  (const uint32_t(*)[3])triangles, n, rule, &part_count,
-                                                  &part_order);
+    const umb_part *parts = c->scratch->failed
+                                ? NULL
+                                : umb_mesh_parts_build(c->scratch,
+                                                       (const float(*)[3])c->soup->positions,
+                                                       (const uint32_t(*)[3])triangles, n, rule,
+                                                       &part_count, &part_order);
     if (parts == NULL || c->scratch->failed) {
         return false;
     }
@@ -133,7 +133,8 @@ static bool cut_group(clusterer *c, uint32_t group, uint32_t begin, uint32_t end
 static bool cut_groups(clusterer *c)
 {
     size_t n = c->order_count;
-    uint32_t *group_starts = umb_scratch_get_zero(c->scratch, (size_t)c->group_count + 2, sizeof *group_starts);
+    uint32_t *group_starts = umb_scratch_get_zero(c->scratch, (size_t)c->group_count + 2,
+                                                  sizeof *group_starts);
     c->order = umb_scratch_get(c->scratch, n, sizeof *c->order);
     c->starts = umb_scratch_get(c->scratch, n + 1, sizeof *c->starts);
     c->owners = umb_scratch_get(c->scratch, n, sizeof *c->owners);
@@ -190,8 +191,8 @@ static bool list_vertices(clusterer *c)
 }
 
 /* Append the triangles around vertex v that are of the cluster's group and not in its list yet. */
-static uint32_t add_around(const clusterer *c, uint32_t v, uint32_t cluster, uint32_t *stamps, uint32_t *list,
-                           uint32_t count, uint32_t limit)
+static uint32_t add_around(const clusterer *c, uint32_t v, uint32_t cluster, uint32_t *stamps,
+                           uint32_t *list, uint32_t count, uint32_t limit)
 {
     for (uint32_t i = c->vertex_starts[v]; i < c->vertex_starts[v + 1] && count < limit; ++i) {
         uint32_t t = c->vertex_triangles[i];
@@ -206,8 +207,10 @@ static uint32_t add_around(const clusterer *c, uint32_t v, uint32_t cluster, uin
 static bool add_rings(clusterer *c)
 {
     uint32_t *stamps = umb_scratch_get(c->scratch, c->soup->triangle_count, sizeof *stamps);
-    uint32_t *vertex_stamps = umb_scratch_get(c->scratch, c->soup->position_count, sizeof *vertex_stamps);
-    c->list_starts = umb_scratch_get(c->scratch, (size_t)c->cluster_count + 1, sizeof *c->list_starts);
+    uint32_t *vertex_stamps = umb_scratch_get(c->scratch, c->soup->position_count,
+                                              sizeof *vertex_stamps);
+    c->list_starts = umb_scratch_get(c->scratch, (size_t)c->cluster_count + 1,
+                                     sizeof *c->list_starts);
     if (c->scratch->failed || !list_vertices(c)) {
         return false;
     }
@@ -311,7 +314,8 @@ static bool make_meshes(const clusterer *c, umb_mesh **meshes)
 
 static umb_weld_group *make_group(const clusterer *c, uint32_t member_count, uint32_t mesh_count)
 {
-    size_t bytes = sizeof(umb_weld_group) + mesh_count * sizeof(umb_mesh *) + member_count * sizeof(uint32_t);
+    size_t bytes = sizeof(umb_weld_group) + mesh_count * sizeof(umb_mesh *) +
+                   member_count * sizeof(uint32_t);
     char *block = umb_memory_allocate(c->soup->allocator, bytes);
     if (block == NULL) {
         return NULL;
@@ -378,8 +382,8 @@ static bool build(clusterer *c, umb_weld_group ***out)
     return true;
 }
 
-bool umb_weld_cluster(umb_weld_soup *soup, umb_scratch *scratch, uint32_t cluster_triangles, uint32_t ring,
-                      umb_weld_group ***groups, uint32_t *group_count)
+bool umb_weld_cluster(umb_weld_soup *soup, umb_scratch *scratch, uint32_t cluster_triangles,
+                      uint32_t ring, umb_weld_group ***groups, uint32_t *group_count)
 {
     clusterer c = {.soup = soup, .scratch = scratch, .target = cluster_triangles, .ring = ring};
     bool ok = build(&c, groups);

@@ -8,15 +8,15 @@
  *       |    / | \    |             |            '.|     here, and the next one around the corner a-b).
  *      a|__/___|___\__|            a|______________|     The hole is filled again without v.
  *
- * Why the surface stays the same set of points: the triangles of a wedge lie in one plane and all turn the
- * same way, so the boundary of their sum says how often each point of the plane is covered. The boundary of
- * those that fill the hole is the same (a-v-b and a-b are the same segment), and they turn that way too:
- * so they cover each point as often. Turns and planes are decided exactly, and no further condition on
- * the shape of the hole is needed for this; a hole that cannot be filled with such triangles is
- * left as it was.
+ * Why the surface stays the same set of points: the triangles of a wedge lie in one plane and all
+ * turn the same way, so the boundary of their sum says how often each point of the plane is
+ * covered. The boundary of those that fill the hole is the same (a-v-b and a-b are the same
+ * segment), and they turn that way too: so they cover each point as often. Turns and planes are
+ * decided exactly, and no further condition on the shape of the hole is needed for this; a hole
+ * that cannot be filled with such triangles is left as it was.
  *
- * Every triangle at v takes part, of whatever object, so no edge loses its partner. A new edge that some
- * other triangle has already would be one of four triangles, so it is not made. */
+ * Every triangle at v takes part, of whatever object, so no edge loses its partner. A new edge that
+ * some other triangle has already would be one of four triangles, so it is not made. */
 #include <math.h>
 #include <string.h>
 
@@ -26,7 +26,8 @@
 #include "weld_soup.h"
 
 #define STAR_LIMIT 64u /* triangles at a vertex that is tried */
-#define GROUP_LIMIT 1024u /* groups of more triangles are left: a plain or a level's floor in one piece is drawn
+#define GROUP_LIMIT                                                                                \
+    1024u /* groups of more triangles are left: a plain or a level's floor in one piece is drawn
                              when its nearest point is reached, and its far end spoils the depth of what
                              it covers there */
 
@@ -38,8 +39,8 @@ typedef struct star {
     uint64_t visited; /* bit per triangle */
 } star;
 
-/* The border of a hole, in a plane of which the coordinates i and j tell; its inside is to that side which
- * turn says. */
+/* The border of a hole, in a plane of which the coordinates i and j tell; its inside is to that
+ * side which turn says. */
 typedef struct hole {
     uint32_t corners[STAR_LIMIT + 1];
     uint32_t count;
@@ -113,7 +114,8 @@ static uint32_t dequeue(merger *m)
     return v;
 }
 
-/* The triangles around v; false if they are none, too many or not of one group of the right size. */
+/* The triangles around v; false if they are none, too many or not of one group of the right
+ * size. */
 static bool gather(merger *m, uint32_t v)
 {
     star *s = &m->star;
@@ -169,7 +171,8 @@ static int turn(const merger *m, const hole *h, uint32_t a, uint32_t b, uint32_t
     return umb_collinear_turn(p[a], p[b], p[c], h->i, h->j);
 }
 
-/* The triangles of v with each two corners that follow one another lie in one plane and turn one way. */
+/* The triangles of v with each two corners that follow one another lie in one plane and turn one
+ * way. */
 static bool is_flat(const merger *m, hole *h, bool closed)
 {
     const float(*p)[3] = (const float(*)[3])m->soup->positions;
@@ -255,8 +258,8 @@ static bool fill(merger *m, hole *h, const umb_weld_triangle *model)
     return turn(m, h, h->corners[0], h->corners[1], h->corners[2]) == h->turn;
 }
 
-/* Follow the star from triangle t to one that ends at a or b, which is returned; UMB_NONE if there is no such
- * way or the triangles differ. The corners before the end become those of the hole. */
+/* Follow the star from triangle t to one that ends at a or b, which is returned; UMB_NONE if there
+ * is no such way or the triangles differ. The corners before the end become those of the hole. */
 static uint32_t follow(merger *m, uint32_t t, uint32_t a, uint32_t b, hole *h)
 {
     star *s = &m->star;

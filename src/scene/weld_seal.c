@@ -1,21 +1,23 @@
 /* Equal triangles, and triangles face to face.
  *
- * Two opposite one-sided triangles at one place block from both sides: they are exactly one two-sided
- * triangle. Where they seal two solids that stand against each other they are better dropped:
+ * Two opposite one-sided triangles at one place block from both sides: they are exactly one
+ * two-sided triangle. Where they seal two solids that stand against each other they are better
+ * dropped:
  *
  *        ______ ______               ______________
  *       |      |      |             |              |      The two lids become neighbours: their common
  *       |  A  >|<  B  |     -->     |    A and B   |      edge is no longer a silhouette of A nor of B,
  *       |______|______|             |______________|      and the seam no crack.
  *
- * Dropping a triangle is always safe: fewer things hide. It costs nothing as long as whoever looks along
- * a line through the pair has crossed a front of A or B before, that is, from everywhere but the inside
- * of the solids. It would cost a wall when the pair is the wall: a partition without thickness in a room.
- * So a sheet of pairs (pairs joined at edges that only pairs share) is dropped when all around its rim
- * there are other triangles, these run as often one way as the other, and turning around the rim from
- * the sheet one meets the back of a triangle first, both ways: the sheet lies inside solid matter. A
- * sheet that ends freely, or that stands in the open, stays as two-sided triangles. The choice is made in
- * plain doubles, because neither outcome is ever wrong. */
+ * Dropping a triangle is always safe: fewer things hide. It costs nothing as long as whoever looks
+ * along a line through the pair has crossed a front of A or B before, that is, from everywhere but
+ * the inside of the solids. It would cost a wall when the pair is the wall: a partition without
+ * thickness in a room. So a sheet of pairs (pairs joined at edges that only pairs share) is dropped
+ * when all around its rim there are other triangles, these run as often one way as the other, and
+ * turning around the rim from the sheet one meets the back of a triangle first, both ways: the
+ * sheet lies inside solid matter. A sheet that ends freely, or that stands in the open, stays as
+ * two-sided triangles. The choice is made in plain doubles, because neither outcome is ever
+ * wrong. */
 #include <math.h>
 #include <string.h>
 
@@ -163,7 +165,8 @@ static bool make_quad(const umb_weld_soup *soup, uint32_t h, uint32_t g, quad *o
     return true;
 }
 
-/* The same quadrilateral cut along its other diagonal is the same set of points: cut q as model is. */
+/* The same quadrilateral cut along its other diagonal is the same set of points: cut q as model
+ * is. */
 static void recut(umb_weld_soup *soup, const quad *q, const quad *model)
 {
     uint32_t *t = soup->triangles[q->t].v, *u = soup->triangles[q->u].v;
@@ -175,8 +178,8 @@ static void recut(umb_weld_soup *soup, const quad *q, const quad *model)
     }
 }
 
-/* Walls that stand against each other are often cut along different diagonals: make these agree, so that
- * their triangles are equal or opposite. */
+/* Walls that stand against each other are often cut along different diagonals: make these agree, so
+ * that their triangles are equal or opposite. */
 static bool match_diagonals(umb_weld_soup *soup, umb_scratch *scratch)
 {
     umb_weld_edges edges;
@@ -195,13 +198,13 @@ static bool match_diagonals(umb_weld_soup *soup, umb_scratch *scratch)
     for (uint32_t begin = 0, end; begin < edges.count; begin = end) {
         end = umb_weld_edges_end(&edges, begin);
         quad q;
-        if (end - begin != 2 || used[edges.halves[begin] / 3] ||
-            used[edges.halves[begin + 1] / 3] ||
+        if (end - begin != 2 || used[edges.halves[begin] / 3] || used[edges.halves[begin + 1] / 3] ||
             !make_quad(soup, edges.halves[begin], edges.halves[begin + 1], &q)) {
             continue;
         }
         size_t slot = hash_ids(q.corners, 4) & (size - 1);
-        while (table[slot] != UMB_NONE && memcmp(quads[table[slot]].corners, q.corners, sizeof q.corners) != 0) {
+        while (table[slot] != UMB_NONE &&
+               memcmp(quads[table[slot]].corners, q.corners, sizeof q.corners) != 0) {
             slot = (slot + 1) & (size - 1);
         }
         if (table[slot] == UMB_NONE) {
@@ -247,8 +250,8 @@ static uint32_t sheet_of(sealer *s, uint32_t t)
     return t;
 }
 
-/* Grows with the angle of (x, y) from (1, 0), counter-clockwise, in [0, 4); needs no library function
- * whose last bit could differ between machines. */
+/* Grows with the angle of (x, y) from (1, 0), counter-clockwise, in [0, 4); needs no library
+ * function whose last bit could differ between machines. */
 static double turn_of(double x, double y)
 {
     double size = fabs(x) + fabs(y);
@@ -259,9 +262,10 @@ static double turn_of(double x, double y)
     return x < 0.0 ? 2.0 - t : t < 0.0 ? 4.0 + t : t;
 }
 
-/* True if, around the edge, the pair's triangles look at nothing but backs (see the top). others: the
- * half-edges of this edge that are in no pair. */
-static bool lies_in_matter(const sealer *s, uint32_t pair_half, const uint32_t *others, uint32_t count)
+/* True if, around the edge, the pair's triangles look at nothing but backs (see the top). others:
+ * the half-edges of this edge that are in no pair. */
+static bool lies_in_matter(const sealer *s, uint32_t pair_half, const uint32_t *others,
+                           uint32_t count)
 {
     const umb_weld_soup *soup = s->soup;
     const uint32_t *v = soup->triangles[pair_half / 3].v;
@@ -294,8 +298,8 @@ static bool lies_in_matter(const sealer *s, uint32_t pair_half, const uint32_t *
     return first_back && last_back;
 }
 
-static void look_at_rim(sealer *s, const uint32_t *pairs, uint32_t pair_count, const uint32_t *others,
-                        uint32_t other_count)
+static void look_at_rim(sealer *s, const uint32_t *pairs, uint32_t pair_count,
+                        const uint32_t *others, uint32_t other_count)
 {
     int64_t balance = 0;
     for (uint32_t i = 0; i < other_count; ++i) {
@@ -313,8 +317,8 @@ static void look_at_rim(sealer *s, const uint32_t *pairs, uint32_t pair_count, c
 }
 
 /* Put the half-edges of pairs (one of the two for each) first, then the others; counts of both. */
-static void sort_out(const sealer *s, uint32_t begin, uint32_t end, uint32_t *work, uint32_t *pair_count,
-                     uint32_t *other_count)
+static void sort_out(const sealer *s, uint32_t begin, uint32_t end, uint32_t *work,
+                     uint32_t *pair_count, uint32_t *other_count)
 {
     *pair_count = *other_count = 0;
     for (uint32_t i = begin; i < end; ++i) {
@@ -360,7 +364,8 @@ static void join_two_sided(umb_weld_soup *soup, uint32_t *opposite)
 {
     for (uint32_t t = 0; t < soup->triangle_count; ++t) {
         uint32_t o = opposite[t];
-        if (o != UMB_NONE && t < o && (soup->triangles[t].two_sided | soup->triangles[o].two_sided) != 0) {
+        if (o != UMB_NONE && t < o &&
+            (soup->triangles[t].two_sided | soup->triangles[o].two_sided) != 0) {
             soup->triangles[t].two_sided = 1;
             drop(&soup->triangles[o]);
             soup->stats.duplicates += 1;

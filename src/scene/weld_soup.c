@@ -35,16 +35,17 @@ static void transform_member(void *data, uint32_t i)
 }
 
 /* Number world positions by first use; numbers[i] is the vertex of world[i]. */
-static bool merge_positions(umb_weld_soup *soup, umb_scratch *scratch, const float (*world)[3], uint32_t count,
-                            uint32_t *numbers)
+static bool merge_positions(umb_weld_soup *soup, umb_scratch *scratch, const float (*world)[3],
+                            uint32_t count, uint32_t *numbers)
 {
     size_t size = 16;
     while (size < 2 * (size_t)count) {
         size *= 2;
     }
     uint32_t *table = umb_scratch_get(scratch, size, sizeof *table);
-    if (table == NULL || !umb_memory_reserve(soup->allocator, (void **)&soup->positions,
-                                             &soup->position_capacity, count, sizeof *soup->positions)) {
+    if (table == NULL ||
+        !umb_memory_reserve(soup->allocator, (void **)&soup->positions, &soup->position_capacity,
+                            count, sizeof *soup->positions)) {
         return false;
     }
     memset(table, 0xFF, size * sizeof *table);
@@ -70,15 +71,17 @@ static bool is_flat(const umb_weld_soup *soup, const uint32_t v[3])
     return umb_collinear(soup->positions[v[0]], soup->positions[v[1]], soup->positions[v[2]]);
 }
 
-static void add_triangles(umb_weld_soup *soup, const umb_scene *scene, uint32_t object, const uint32_t *numbers)
+static void add_triangles(umb_weld_soup *soup, const umb_scene *scene, uint32_t object,
+                          const uint32_t *numbers)
 {
     const umb_placement *p = &scene->objects[object].placement;
     const umb_mesh *mesh = umb_scene_mesh(scene, p->shape);
     for (uint32_t t = 0; t < mesh->triangle_count; ++t) {
         const uint32_t *c = mesh->triangles[t];
-        umb_weld_triangle w = {{numbers[c[0]], numbers[c[p->mirrored ? 2 : 1]], numbers[c[p->mirrored ? 1 : 2]]},
-                               object,
-                               mesh->two_sided[t]};
+        umb_weld_triangle w = {
+            {numbers[c[0]], numbers[c[p->mirrored ? 2 : 1]], numbers[c[p->mirrored ? 1 : 2]]},
+            object,
+            mesh->two_sided[t]};
         if (!is_flat(soup, w.v)) {
             soup->triangles[soup->triangle_count++] = w;
         }
@@ -114,14 +117,15 @@ static umb_result collect(umb_weld_soup *soup, umb_scene *scene, umb_scratch *sc
     }
     float(*world)[3] = umb_scratch_get(scratch, (size_t)position_count, sizeof *world);
     uint32_t *numbers = umb_scratch_get(scratch, (size_t)position_count, sizeof *numbers);
-    if (scratch->failed || !umb_memory_reserve(soup->allocator, (void **)&soup->triangles,
-                                               &soup->triangle_capacity, (size_t)triangle_count + 1,
-                                               sizeof *soup->triangles)) {
+    if (scratch->failed ||
+        !umb_memory_reserve(soup->allocator, (void **)&soup->triangles, &soup->triangle_capacity,
+                            (size_t)triangle_count + 1, sizeof *soup->triangles)) {
         return UMB_ERROR_MEMORY;
     }
     collect_task task = {scene, members, offsets, world};
     umb_tasks_run(soup->tasks, transform_member, &task, count);
-    if (!merge_positions(soup, scratch, (const float(*)[3])world, (uint32_t)position_count, numbers)) {
+    if (!merge_positions(soup, scratch, (const float(*)[3])world, (uint32_t)position_count,
+                         numbers)) {
         return UMB_ERROR_MEMORY;
     }
     for (uint32_t i = 0; i < count; ++i) {
@@ -135,8 +139,10 @@ static umb_result collect(umb_weld_soup *soup, umb_scene *scene, umb_scratch *sc
 umb_result umb_weld_soup_collect(umb_weld_soup *soup, umb_scene *scene)
 {
     soup->object_count = scene->object_ids.used;
-    soup->parents = umb_memory_allocate_zero(soup->allocator, soup->object_count, sizeof *soup->parents);
-    soup->merged = umb_memory_allocate_zero(soup->allocator, soup->object_count, sizeof *soup->merged);
+    soup->parents = umb_memory_allocate_zero(soup->allocator, soup->object_count,
+                                             sizeof *soup->parents);
+    soup->merged = umb_memory_allocate_zero(soup->allocator, soup->object_count,
+                                            sizeof *soup->merged);
     if (soup->parents == NULL || soup->merged == NULL) {
         return UMB_ERROR_MEMORY;
     }
@@ -151,8 +157,10 @@ umb_result umb_weld_soup_collect(umb_weld_soup *soup, umb_scene *scene)
 
 void umb_weld_soup_free(umb_weld_soup *soup)
 {
-    umb_memory_free(soup->allocator, soup->positions, soup->position_capacity * sizeof *soup->positions);
-    umb_memory_free(soup->allocator, soup->triangles, soup->triangle_capacity * sizeof *soup->triangles);
+    umb_memory_free(soup->allocator, soup->positions,
+                    soup->position_capacity * sizeof *soup->positions);
+    umb_memory_free(soup->allocator, soup->triangles,
+                    soup->triangle_capacity * sizeof *soup->triangles);
     umb_memory_free(soup->allocator, soup->parents, soup->object_count * sizeof *soup->parents);
     umb_memory_free(soup->allocator, soup->merged, soup->object_count * sizeof *soup->merged);
 }

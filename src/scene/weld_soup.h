@@ -1,6 +1,8 @@
-/* The triangles of all static objects in world coordinates, and the steps that a weld takes on them.
+/* The triangles of all static objects in world coordinates, and the steps that a weld takes on
+ * them.
  *
- * What blocks only ever shrinks: every step keeps the set of blocked sight-lines or takes some away. */
+ * What blocks only ever shrinks: every step keeps the set of blocked sight-lines or takes some
+ * away. */
 #ifndef UMB_WELD_SOUP_H
 #define UMB_WELD_SOUP_H
 
@@ -55,8 +57,8 @@ static inline uint32_t umb_weld_edges_end(const umb_weld_edges *edges, uint32_t 
     return end;
 }
 
-/* Equal triangles are kept once, those face to face dropped where they lie between solids. False when
- * there is no memory, as for all below. */
+/* Equal triangles are kept once, those face to face dropped where they lie between solids. False
+ * when there is no memory, as for all below. */
 bool umb_weld_seal(umb_weld_soup *soup);
 
 /* Vertices that lie exactly on an edge that has no partner split it. */
@@ -68,8 +70,8 @@ bool umb_weld_unite(umb_weld_soup *soup);
 /* Vertices that a flat surface can do without are taken out. After umb_weld_unite(). */
 bool umb_weld_merge(umb_weld_soup *soup);
 
-/* Groups of objects that touch, cut into clusters with their meshes. On success *groups is an array of
- * the scratch memory; the caller owns the groups themselves. */
+/* Groups of objects that touch, cut into clusters with their meshes. On success *groups is an array
+ * of the scratch memory; the caller owns the groups themselves. */
 bool umb_weld_cluster(umb_weld_soup *soup, umb_scratch *scratch, uint32_t cluster_triangles, uint32_t ring,
                       umb_weld_group ***groups, uint32_t *group_count);
 

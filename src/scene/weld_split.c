@@ -7,16 +7,16 @@
  *       |______|_______|            |        |        |     crack. Splitting the triangle below at m
  *                                                           covers the same points and pairs them.
  *
- * Only edges without a partner are looked at, and only ends of such edges split: a vertex that merely
- * touches pairs nothing. Edges along an axis are gathered by the line they lie on, which finds every
- * overlap; any other edge is followed from its ends over the edges that run the same way exactly, which
- * finds those that share a chain of vertices with it. Being on an edge is decided exactly, so the parts
- * of a triangle are together the very same set of points. */
+ * Only edges without a partner are looked at, and only ends of such edges split: a vertex that
+ * merely touches pairs nothing. Edges along an axis are gathered by the line they lie on, which
+ * finds every overlap; any other edge is followed from its ends over the edges that run the same
+ * way exactly, which finds those that share a chain of vertices with it. Being on an edge is
+ * decided exactly, so the parts of a triangle are together the very same set of points. */
 #include "base/sort.h"
 #include "geometry/collinear.h"
 #include "weld_soup.h"
 
-#define FAN_LIMIT 256u /* edges at one vertex that are tried */
+#define FAN_LIMIT 256u  /* edges at one vertex that are tried */
 #define STACK_SIZE 128u /* each cut halves one side's points: three times 32 levels at most */
 
 /* An edge without a partner, from the lower to the higher vertex. */
@@ -47,7 +47,12 @@ static bool find_open_edges(splitter *s)
     }
     for (uint32_t begin = 0, end; begin < s->edges.count; begin = end) {
         end = umb_weld_edges_end(&s->edges, begin);
-        open_edge e = {(uint32_t)(s->edges.keys[begin] >> 32), (uint32_t)s->edges.keys[begin], begin, end, 0, 0};
+        open_edge e = {(uint32_t)(s->edges.keys[begin] >> 32),
+                       (uint32_t)s->edges.keys[begin],
+                       begin,
+                       end,
+                       0,
+                       0};
         int64_t balance = 0;
         bool two_sided = false;
         for (uint32_t i = begin; i < end; ++i) {
@@ -91,8 +96,9 @@ static void found(splitter *s, uint32_t i, uint32_t m)
     }
     if (!umb_memory_reserve(s->soup->allocator, (void **)&s->found_keys, &s->found_key_capacity,
                             (size_t)s->found_count + 1, sizeof *s->found_keys) ||
-        !umb_memory_reserve(s->soup->allocator, (void **)&s->found_vertices, &s->found_vertex_capacity,
-                            (size_t)s->found_count + 1, sizeof *s->found_vertices)) {
+        !umb_memory_reserve(s->soup->allocator, (void **)&s->found_vertices,
+                            &s->found_vertex_capacity, (size_t)s->found_count + 1,
+                            sizeof *s->found_vertices)) {
         s->failed = true;
         return;
     }
@@ -118,8 +124,9 @@ static uint64_t line_hash(const float *p, int axis)
 }
 
 /* All open edges of one axis-parallel line (or of several with one hash: the exact test tells). */
-static void split_on_line(splitter *s, const uint32_t *members, uint32_t count, int axis, uint64_t *ends,
-                          uint32_t *vertices, uint64_t *key_scratch, uint32_t *value_scratch)
+static void split_on_line(splitter *s, const uint32_t *members, uint32_t count, int axis,
+                          uint64_t *ends, uint32_t *vertices, uint64_t *key_scratch,
+                          uint32_t *value_scratch)
 {
     uint32_t n = 0;
     for (uint32_t i = 0; i < count; ++i) {
@@ -184,7 +191,8 @@ static bool split_along_axes(splitter *s)
         }
         if (end - begin > 1) {
             int axis = main_axis(s, &s->open[members[begin]], &parallel);
-            split_on_line(s, members + begin, end - begin, axis, ends, vertices, key_scratch, value_scratch);
+            split_on_line(s, members + begin, end - begin, axis, ends, vertices, key_scratch,
+                          value_scratch);
         }
     }
     umb_scratch_drop(s->scratch, keys);
@@ -203,7 +211,8 @@ typedef struct fan {
     uint32_t count;
 } fan;
 
-/* The nearest vertex to from that an open edge at from leads to and that lies between from and to. */
+/* The nearest vertex to from that an open edge at from leads to and that lies between from and
+ * to. */
 static uint32_t next_between(const splitter *s, const fan *f, uint32_t from, uint32_t to, int axis)
 {
     uint32_t a = 0, b = f->count;
@@ -230,7 +239,8 @@ static uint32_t next_between(const splitter *s, const fan *f, uint32_t from, uin
 static bool split_along_chains(splitter *s)
 {
     size_t n = 2 * (size_t)s->open_count;
-    fan f = {umb_scratch_get(s->scratch, n, sizeof *f.keys), umb_scratch_get(s->scratch, n, sizeof *f.unused), 0};
+    fan f = {umb_scratch_get(s->scratch, n, sizeof *f.keys),
+             umb_scratch_get(s->scratch, n, sizeof *f.unused), 0};
     uint64_t *key_scratch = umb_scratch_get(s->scratch, n, sizeof *key_scratch);
     uint32_t *value_scratch = umb_scratch_get(s->scratch, n, sizeof *value_scratch);
     if (s->scratch->failed) {
@@ -339,7 +349,8 @@ static void split_triangle(splitter *s, uint32_t t, const uint32_t *half_edges)
     }
 }
 
-/* Sort what was found, drop what was found twice, and note for each open edge which points are its. */
+/* Sort what was found, drop what was found twice, and note for each open edge which points are
+ * its. */
 static bool sort_points(splitter *s)
 {
     uint64_t *key_scratch = umb_scratch_get(s->scratch, s->found_count, sizeof *key_scratch);
@@ -387,8 +398,8 @@ static bool split_triangles(splitter *s)
     if (before + more > (1u << 30)) {
         return true; /* too many to number: left as they are */
     }
-    if (!umb_memory_reserve(soup->allocator, (void **)&soup->triangles, &soup->triangle_capacity, before + more,
-                            sizeof *soup->triangles)) {
+    if (!umb_memory_reserve(soup->allocator, (void **)&soup->triangles, &soup->triangle_capacity,
+                            before + more, sizeof *soup->triangles)) {
         return false;
     }
     for (uint32_t t = 0; t < before; ++t) {
@@ -404,15 +415,17 @@ bool umb_weld_split(umb_weld_soup *soup)
 {
     umb_scratch scratch = {.allocator = soup->allocator};
     splitter s = {.soup = soup, .scratch = &scratch};
-    /* Edges nested on one line could find a quadratic number of points: more than this is no scene. */
+    /* Edges nested on one line could find a quadratic number of points: more than this is no
+     * scene. */
     s.found_limit = soup->triangle_count < (1u << 28) ? 4 * soup->triangle_count + 64 : 1u << 30;
-    bool ok = umb_weld_edges_build(&s.edges, &scratch, soup) && find_open_edges(&s) && split_along_axes(&s) &&
-              split_along_chains(&s);
+    bool ok = umb_weld_edges_build(&s.edges, &scratch, soup) && find_open_edges(&s) &&
+              split_along_axes(&s) && split_along_chains(&s);
     if (ok && s.found_count > 0) {
         ok = split_triangles(&s);
     }
     umb_memory_free(soup->allocator, s.found_keys, s.found_key_capacity * sizeof *s.found_keys);
-    umb_memory_free(soup->allocator, s.found_vertices, s.found_vertex_capacity * sizeof *s.found_vertices);
+    umb_memory_free(soup->allocator, s.found_vertices,
+                    s.found_vertex_capacity * sizeof *s.found_vertices);
     umb_scratch_free(&scratch);
     return ok;
 }

@@ -1,6 +1,7 @@
-/* A stand-in for a fuzzer's driver, for builds without one: feeds LLVMFuzzerTestOneInput every file of
- * a corpus folder, then cut and damaged copies of it, the same ones in the same order each time, as many
- * as fit into a few seconds. It finds less than a fuzzer and runs in every test, under sanitizers too. */
+/* A stand-in for a fuzzer's driver, for builds without one: feeds LLVMFuzzerTestOneInput every file
+ * of a corpus folder, then cut and damaged copies of it, the same ones in the same order each time,
+ * as many as fit into a few seconds. It finds less than a fuzzer and runs in every test, under
+ * sanitizers too. */
 #include <dirent.h>
 #include <stdint.h>
 #include <stdio.h>

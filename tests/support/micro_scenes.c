@@ -76,7 +76,8 @@ static void place(builder *b, uint32_t mesh, const double m[3][4])
 }
 
 /* A rotation, any angle about any axis, times sizes, with a translation. */
-static void random_frame(rng *r, const double size[3], const double at[3], bool turned, double m[3][4])
+static void random_frame(rng *r, const double size[3], const double at[3], bool turned,
+                         double m[3][4])
 {
     double q[4], n = 0;
     for (int i = 0; i < 4; ++i) {
@@ -181,12 +182,13 @@ static void add_box(builder *b, uint32_t mesh, const double at[3], const double 
 }
 
 /* Things behind, to be hidden or not. The eye looks along -z from about the origin. */
-static void add_targets(builder *b, uint32_t box, uint32_t count, double near_z, double far_z, double spread)
+static void add_targets(builder *b, uint32_t box, uint32_t count, double near_z, double far_z,
+                        double spread)
 {
     for (uint32_t i = 0; i < count; ++i) {
         double z = scale_between(&b->random, near_z, far_z);
-        double at[3] = {between(&b->random, -spread, spread) * z, between(&b->random, -spread, spread) * z,
-                        -z};
+        double at[3] = {between(&b->random, -spread, spread) * z,
+                        between(&b->random, -spread, spread) * z, -z};
         double s = scale_between(&b->random, 0.003, 0.2) * z;
         double size[3] = {s * between(&b->random, 0.2, 1), s * between(&b->random, 0.2, 1),
                           s * between(&b->random, 0.2, 1)};
@@ -201,7 +203,8 @@ static void make_boxes(builder *b)
     for (uint32_t i = 0; i < walls; ++i) {
         double z = scale_between(&b->random, 0.3, 8);
         double at[3] = {between(&b->random, -0.5, 0.5) * z, between(&b->random, -0.5, 0.5) * z, -z};
-        double size[3] = {z * scale_between(&b->random, 0.01, 1.5), z * scale_between(&b->random, 0.01, 1.5),
+        double size[3] = {z * scale_between(&b->random, 0.01, 1.5),
+                          z * scale_between(&b->random, 0.01, 1.5),
                           z * scale_between(&b->random, 0.001, 0.5)};
         add_box(b, box, at, size, below(&b->random, 3) != 0);
     }
@@ -259,7 +262,8 @@ static void make_meshes(builder *b)
     add_targets(b, box, 24, 2, 30, 0.5);
 }
 
-/* Static walls that meet exactly, from pieces; some pieces missing; T-junctions on a dyadic grid. */
+/* Static walls that meet exactly, from pieces; some pieces missing; T-junctions on a dyadic
+ * grid. */
 static void make_seams(builder *b)
 {
     uint32_t box = unit_box(b, 0);
@@ -290,7 +294,8 @@ static void make_scales(builder *b)
         double z = scale_between(&b->random, 0.2, 1e4);
         double at[3] = {between(&b->random, -1, 1) * z, between(&b->random, -1, 1) * z, -z};
         double s = scale_between(&b->random, 1e-4, 1e5);
-        double size[3] = {s, s * scale_between(&b->random, 1e-3, 1), s * scale_between(&b->random, 1e-3, 1)};
+        double size[3] = {s, s * scale_between(&b->random, 1e-3, 1),
+                          s * scale_between(&b->random, 1e-3, 1)};
         add_box(b, box, at, size, below(&b->random, 2) != 0);
     }
     add_targets(b, box, 24, 1, 2e4, 0.6);
@@ -337,12 +342,14 @@ static void make_soup(builder *b)
 /* Around the eye: walls that the near depth cuts, boxes that hold the eye. */
 static void make_near(builder *b)
 {
-    uint32_t box = unit_box(b, 0), wall = unit_wall(b, 3, below(&b->random, 2) != 0 ? UMB_TRIANGLE_TWO_SIDED : 0);
+    uint32_t box = unit_box(b, 0),
+             wall = unit_wall(b, 3, below(&b->random, 2) != 0 ? UMB_TRIANGLE_TWO_SIDED : 0);
     for (uint32_t i = 0; i < 5; ++i) {
         double at[3] = {between(&b->random, -0.3, 0.3), between(&b->random, -0.3, 0.3),
                         between(&b->random, -0.6, 0.2)};
         double s = scale_between(&b->random, 0.05, 5);
-        double size[3] = {s, s * scale_between(&b->random, 0.05, 1), s * scale_between(&b->random, 0.01, 1)};
+        double size[3] = {s, s * scale_between(&b->random, 0.05, 1),
+                          s * scale_between(&b->random, 0.01, 1)};
         add_box(b, below(&b->random, 2) != 0 ? wall : box, at, size, true);
     }
     add_targets(b, box, 24, 0.5, 20, 0.6);
@@ -355,10 +362,11 @@ typedef struct kind {
 } kind;
 
 static const kind KINDS[] = {
-    {"boxes", make_boxes, false},       {"slit", make_slit, false},     {"needles", make_needles, false},
-    {"meshes", make_meshes, false},     {"seams", make_seams, true},    {"scales", make_scales, false},
-    {"coplanar", make_coplanar, true},  {"soup", make_soup, true},      {"near", make_near, false},
-    {"coplanar-loose", make_coplanar, false},
+    {"boxes", make_boxes, false},      {"slit", make_slit, false},
+    {"needles", make_needles, false},  {"meshes", make_meshes, false},
+    {"seams", make_seams, true},       {"scales", make_scales, false},
+    {"coplanar", make_coplanar, true}, {"soup", make_soup, true},
+    {"near", make_near, false},        {"coplanar-loose", make_coplanar, false},
 };
 
 uint32_t micro_scene_kinds(void)
@@ -366,7 +374,8 @@ uint32_t micro_scene_kinds(void)
     return sizeof KINDS / sizeof KINDS[0];
 }
 
-/* An eye near the origin looking about -z; sometimes exactly on a vertex, a face or a box corner. */
+/* An eye near the origin looking about -z; sometimes exactly on a vertex, a face or a box
+ * corner. */
 static void make_view(rng *r, const model *m, umb_view *view)
 {
     double eye[3] = {between(r, -0.05, 0.05), between(r, -0.05, 0.05), between(r, -0.05, 0.05)};
@@ -397,11 +406,11 @@ static void make_view(rng *r, const model *m, umb_view *view)
     double up[3] = {sin(roll), cos(roll), 0};
     double near_depth = scale_between(r, 0.01, 0.4), far_depth = below(r, 4) == 0 ? INFINITY : 1e5;
     if (below(r, 4) == 0) {
-        (void)umb_view_look_at_ortho(view, eye, target, up, scale_between(r, 0.5, 10), between(r, 0.5, 2),
-                                     near_depth, 1e5);
+        (void)umb_view_look_at_ortho(view, eye, target, up, scale_between(r, 0.5, 10),
+                                     between(r, 0.5, 2), near_depth, 1e5);
     } else {
-        (void)umb_view_look_at(view, eye, target, up, between(r, 0.2, 2.4), between(r, 0.5, 2), near_depth,
-                               far_depth);
+        (void)umb_view_look_at(view, eye, target, up, between(r, 0.2, 2.4), between(r, 0.5, 2),
+                               near_depth, far_depth);
     }
     view->width = 96;
     view->height = 96;

@@ -1,5 +1,5 @@
-/* Small scenes meant to break a culler, from a seed: random and adversarial by turns. Tests and the soak
- * run share them, so that a failing seed can be looked at. */
+/* Small scenes meant to break a culler, from a seed: random and adversarial by turns. Tests and the
+ * soak run share them, so that a failing seed can be looked at. */
 #ifndef MICRO_SCENES_H
 #define MICRO_SCENES_H
 

@@ -35,8 +35,9 @@ static inline double random_power(uint64_t *state, double low_exponent, double h
     return random_next(state) & 1 ? v : -v;
 }
 
-/* scale: how far eye and target may be from the origin. Every fourth view is orthographic, every third
- * is turned about axes only; some have no far plane, some have extra planes, some are off-centre. */
+/* scale: how far eye and target may be from the origin. Every fourth view is orthographic, every
+ * third is turned about axes only; some have no far plane, some have extra planes, some are
+ * off-centre. */
 static inline umb_view random_view(uint64_t *state, double scale)
 {
     umb_view v;

@@ -1,5 +1,5 @@
-/* The real scenes of UMBRAGE_SCENES: each a file with NAME.path.csv and NAME.path.json beside it. Tests and
- * the soak run look at them the way the command line does. */
+/* The real scenes of UMBRAGE_SCENES: each a file with NAME.path.csv and NAME.path.json beside it.
+ * Tests and the soak run look at them the way the command line does. */
 #ifndef REAL_SCENES_H
 #define REAL_SCENES_H
 

@@ -16,8 +16,8 @@ typedef struct strict_answer {
     strict_count *sum; /* what is found is added here */
 } strict_answer;
 
-/* Ask the oracle once about everything that any of the answers leaves out, judge each of them, and print
- * each wrongly hidden object with its witness. False when the oracle itself fails. */
+/* Ask the oracle once about everything that any of the answers leaves out, judge each of them, and
+ * print each wrongly hidden object with its witness. False when the oracle itself fails. */
 bool strict_check_all(truth *t, const model *m, const umb_view *view, const strict_answer *answers,
                       uint32_t answer_count, const truth_options *options);
 

@@ -85,8 +85,7 @@ void bitmap_rectangle(bitmap *im, int x, int y, int width, int height, bitmap_co
     }
 }
 
-void bitmap_frame(bitmap *im, int x, int y, int width, int height, int thickness,
-                  bitmap_color color)
+void bitmap_frame(bitmap *im, int x, int y, int width, int height, int thickness, bitmap_color color)
 {
     bitmap_rectangle(im, x, y, width, thickness, color, 1.0);
     bitmap_rectangle(im, x, y + height - thickness, width, thickness, color, 1.0);

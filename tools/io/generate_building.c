@@ -144,15 +144,13 @@ static void add_cells(generate_mesh *g, const double *x, uint32_t nx, const doub
             generate_quad(g, v[0][i][j], v[1][i][j], v[1][i][j + 1], v[0][i][j + 1]);
         }
         if (!SOLID(i + 1, j)) {
-            generate_quad(g, v[0][i + 1][j], v[0][i + 1][j + 1], v[1][i + 1][j + 1],
-                          v[1][i + 1][j]);
+            generate_quad(g, v[0][i + 1][j], v[0][i + 1][j + 1], v[1][i + 1][j + 1], v[1][i + 1][j]);
         }
         if (!SOLID(i, j - 1)) {
             generate_quad(g, v[0][i][j], v[0][i + 1][j], v[1][i + 1][j], v[1][i][j]);
         }
         if (!SOLID(i, j + 1)) {
-            generate_quad(g, v[1][i][j + 1], v[1][i + 1][j + 1], v[0][i + 1][j + 1],
-                          v[0][i][j + 1]);
+            generate_quad(g, v[1][i][j + 1], v[1][i + 1][j + 1], v[0][i + 1][j + 1], v[0][i][j + 1]);
         }
     }
 #undef SOLID

@@ -131,8 +131,7 @@ static uint32_t building_triangles(const city_building *b)
     return sum;
 }
 
-static void add_solid(generate_mesh *g, const city_plan *p, double w, double d, double y0,
-                      double y1)
+static void add_solid(generate_mesh *g, const city_plan *p, double w, double d, double y0, double y1)
 {
     uint32_t low[8], high[8];
     for (uint32_t k = 0; k < p->corners; ++k) {
@@ -407,7 +406,4 @@ static bool city_path(const uint64_t *values, camera_path *out)
 }
 
 const generate_kind generate_city = {
-    "city",
-    {{"triangles", 1000000, 1, 100000000}, {"seed", 7, 0, UINT32_MAX}},
-    city_model,
-    city_path};
+    "city", {{"triangles", 1000000, 1, 100000000}, {"seed", 7, 0, UINT32_MAX}}, city_model, city_path};

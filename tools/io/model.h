@@ -1,9 +1,9 @@
-/* A model: what a scene file or a generator gives, before any culling. Tools and tests share it; the
- * oracle reads it directly, the library is fed from it by model_scene.h.
+/* A model: what a scene file or a generator gives, before any culling. Tools and tests share it;
+ * the oracle reads it directly, the library is fed from it by model_scene.h.
  *
- * Objects are numbered as the command line documents. World vertices are
- * umb_transform applied as geometry.h says (double sums, rounded once), minus nothing: origin has been
- * subtracted already, exactly, when the model was read.
+ * Objects are numbered as the command line documents. World vertices are umb_transform applied as
+ * geometry.h says (double sums, rounded once), minus nothing: origin has been subtracted already,
+ * exactly, when the model was read.
  */
 #ifndef MODEL_H
 #define MODEL_H
@@ -12,7 +12,8 @@
 
 #define MODEL_NONE UINT32_MAX
 
-/* Triangles shared by instances. flags: UMB_TRIANGLE_* per triangle, never NULL when there are any. */
+/* Triangles shared by instances. flags: UMB_TRIANGLE_* per triangle, never NULL when there are
+ * any. */
 typedef struct model_mesh {
     float *positions; /* 3 per vertex */
     uint32_t *indices; /* 3 per triangle */
@@ -60,13 +61,13 @@ typedef struct model_options {
     uint32_t split;  /* cut meshes of more triangles than this into spatial clusters; 0: never */
 } model_options;
 
-/* Read SCENE: a file name, `pack.pk3:maps/name.bsp`, or `gen:name,key=value,...`. options may be NULL.
- * On failure returns NULL and error holds one line: what, where, remedy. */
+/* Read SCENE: a file name, `pack.pk3:maps/name.bsp`, or `gen:name,key=value,...`. options may be
+ * NULL. On failure returns NULL and error holds one line: what, where, remedy. */
 model *model_load(const char *scene, const model_options *options, umb_error *error);
 void model_free(model *m);
 
-/* Building blocks for readers and generators. All of them abort the load by returning false / MODEL_NONE
- * when memory is short. model_add_mesh and model_add_object copy. */
+/* Building blocks for readers and generators. All of them abort the load by returning false /
+ * MODEL_NONE when memory is short. model_add_mesh and model_add_object copy. */
 model *model_create(void);
 uint32_t model_add_mesh(model *m, const model_mesh *mesh);
 uint32_t model_add_object(model *m, const char *name, uint32_t mesh, const umb_transform *transform);
@@ -89,7 +90,8 @@ typedef struct camera_path {
     uint32_t count;
 } camera_path;
 
-/* Read `FILE.csv` or `gen:blocks,g=32`. Rows that are no six numbers are errors, except a header. */
+/* Read `FILE.csv` or `gen:blocks,g=32`. Rows that are no six numbers are errors, except a
+ * header. */
 bool camera_path_load(const char *name, camera_path *out, umb_error *error);
 void camera_path_free(camera_path *p);
 

@@ -9,7 +9,8 @@ static umb_result fail(umb_error *error, umb_result code, const char *what, uint
 {
     if (error != NULL) {
         error->code = code;
-        (void)snprintf(error->text, sizeof error->text, "%s %u: %s", what, number, umb_result_name(code));
+        (void)snprintf(error->text, sizeof error->text, "%s %u: %s", what, number,
+                       umb_result_name(code));
     }
     return code;
 }
@@ -34,11 +35,14 @@ static umb_result add_shapes(umb_scene *scene, const model *m, umb_shape *shapes
     return UMB_OK;
 }
 
-static umb_result add_objects(umb_scene *scene, const model *m, const umb_shape *shapes, umb_error *error)
+static umb_result add_objects(umb_scene *scene, const model *m, const umb_shape *shapes,
+                              umb_error *error)
 {
     for (uint32_t i = 0; i < m->object_count; ++i) {
         const model_object *o = &m->objects[i];
-        umb_object_def def = {.bounds = o->bounds, .transform = o->transform, .flags = UMB_OBJECT_STATIC | UMB_OBJECT_IS_SHAPE};
+        umb_object_def def = {.bounds = o->bounds,
+                              .transform = o->transform,
+                              .flags = UMB_OBJECT_STATIC | UMB_OBJECT_IS_SHAPE};
         if (o->mesh != MODEL_NONE) {
             def.shape = shapes[o->mesh];
         }
@@ -54,7 +58,8 @@ static umb_result add_objects(umb_scene *scene, const model *m, const umb_shape 
     return UMB_OK;
 }
 
-umb_scene *model_scene(const model *m, bool weld, umb_tasks tasks, umb_weld_stats *stats, umb_error *error)
+umb_scene *model_scene(const model *m, bool weld, umb_tasks tasks, umb_weld_stats *stats,
+                       umb_error *error)
 {
     umb_scene *scene = NULL;
     umb_scene_def def = {.origin = {m->origin[0], m->origin[1], m->origin[2]}};

@@ -161,7 +161,8 @@ static int check_all(const setup *s, const options *o, const views *v, check *c)
     return code;
 }
 
-/* Reported over truly visible; nothing over nothing is perfect, something over nothing has no number. */
+/* Reported over truly visible; nothing over nothing is perfect, something over nothing has no
+ * number. */
 static double conservativity(uint64_t reported, uint64_t visible)
 {
     return visible > 0 ? (double)reported / (double)visible : reported > 0 ? NAN : 1.0;

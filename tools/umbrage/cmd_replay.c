@@ -49,8 +49,8 @@ static int read_all(const options *o, unsigned char **bytes, size_t *size)
     return bad ? fail(o, EXIT_INPUT, "%s: cannot be read", o->input) : EXIT_DONE;
 }
 
-/* One list after the other: objects of one answer only, by id; when there are none, the places where the
- * orders differ. marks: 1 was there, 2 is there. */
+/* One list after the other: objects of one answer only, by id; when there are none, the places
+ * where the orders differ. marks: 1 was there, 2 is there. */
 static bool find_differences(replay *r)
 {
     const umb_capture *c = &r->capture;

@@ -13,7 +13,8 @@ typedef struct walk {
     double median_ms, p99_ms, visible_mean, in_frustum_mean;
 } walk;
 
-/* Two passes, so that what is counted outside the timing does not cool the caches of what is timed. */
+/* Two passes, so that what is counted outside the timing does not cool the caches of what is
+ * timed. */
 static int answer_all(const setup *s, const options *o, const views *v, walk *w)
 {
     int code = EXIT_DONE;

@@ -18,8 +18,8 @@ typedef struct frame {
     uint32_t *ids; /* as answered, or NULL; owned */
 } frame;
 
-/* Answer once and note what came. with_ids: keep the ids. *set is the answer itself, valid until the
- * culler's next call; may be NULL. in_frustum stays 0. */
+/* Answer once and note what came. with_ids: keep the ids. *set is the answer itself, valid until
+ * the culler's next call; may be NULL. in_frustum stays 0. */
 int frame_answer(const setup *s, const options *o, const umb_view *view, bool with_ids, frame *out,
                  umb_visible_set *set);
 /* How many objects meet the frustum, whatever their size on the picture. */

@@ -37,7 +37,8 @@ static void put_byte(json_text *j, char byte)
     put(j, &byte, 1);
 }
 
-/* Length of the well-formed UTF-8 sequence at s; 0: there is none. Shortest forms only, no surrogates. */
+/* Length of the well-formed UTF-8 sequence at s; 0: there is none. Shortest forms only, no
+ * surrogates. */
 static size_t sequence(const unsigned char *s)
 {
     size_t more = s[0] < 0x80                   ? 0

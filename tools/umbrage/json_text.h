@@ -1,4 +1,5 @@
-/* JSON as one line of text, written front to back: lists of a million ids need no tree in memory. */
+/* JSON as one line of text, written front to back: lists of a million ids need no tree in
+ * memory. */
 #ifndef JSON_TEXT_H
 #define JSON_TEXT_H
 

@@ -395,8 +395,8 @@ bool options_given(const options *o, const char *name)
     return false;
 }
 
-/* The option that a word starting with a minus names, for this subcommand; NULL: none. *value is what
- * follows an equals sign. */
+/* The option that a word starting with a minus names, for this subcommand; NULL: none. *value is
+ * what follows an equals sign. */
 static const option_spec *find(const char *word, int which, const char **value)
 {
     size_t length = strcspn(word, "=");

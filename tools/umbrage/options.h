@@ -22,8 +22,8 @@ enum {
     PICTURE_ALL = 15u
 };
 
-/* Everything that can be said on the command line. given has a bit for each option of the table that
- * was used: see options_given(). */
+/* Everything that can be said on the command line. given has a bit for each option of the table
+ * that was used: see options_given(). */
 typedef struct options {
     const char *command; /* the subcommand's name, for messages */
     const char *input;   /* the one argument that is no option; NULL when there is none */
@@ -79,8 +79,8 @@ int cmd_render(const options *o);
 int cmd_generate(const options *o);
 int cmd_replay(const options *o);
 
-/* Read the words after the subcommand. EXIT_DONE, or EXIT_USAGE with the message printed. *help is set
- * when help was asked for; nothing else is meaningful then. */
+/* Read the words after the subcommand. EXIT_DONE, or EXIT_USAGE with the message printed. *help is
+ * set when help was asked for; nothing else is meaningful then. */
 int options_read(const command *c, int which, int count, char **words, options *out, bool *help);
 /* True if the option of that name (without dashes) was used. */
 bool options_given(const options *o, const char *name);

@@ -13,7 +13,8 @@ typedef struct progress {
 
 /* Silent unless standard error is a terminal or --progress was given. */
 progress progress_begin(const options *o, const char *what, uint32_t total);
-/* done of total are finished: percent, rate and the time left, five times a second at most, in a log once. */
+/* done of total are finished: percent, rate and the time left, five times a second at most, in a
+ * log once. */
 void progress_step(progress *p, uint32_t done);
 /* Clear the line. */
 void progress_end(progress *p);

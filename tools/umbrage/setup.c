@@ -15,7 +15,8 @@ static bool is_generated(const char *name)
     return strncmp(name, "gen:", 4) == 0;
 }
 
-/* With --seed, a generator's name with the seed added; the last of equal keys counts. NULL without. */
+/* With --seed, a generator's name with the seed added; the last of equal keys counts. NULL
+ * without. */
 static char *seeded(const options *o, const char *name)
 {
     if (!o->seed || !is_generated(name)) {
@@ -127,9 +128,10 @@ void setup_to_file(const model *m, const double in[3], double out[3])
 
 /* ---- views ---------------------------------------------------------------------------------- */
 
-/* Nothing of the scene lies deeper than the distance to the farthest corner of its box. Three exact or
- * once-rounded differences, squares, two sums, a root, and the rounding of forward to unit length: under
- * 12 roundings of DBL_EPSILON / 2 each, so 16 epsilons keep the corner itself in view. */
+/* Nothing of the scene lies deeper than the distance to the farthest corner of its box. Three exact
+ * or once-rounded differences, squares, two sums, a root, and the rounding of forward to unit
+ * length: under 12 roundings of DBL_EPSILON / 2 each, so 16 epsilons keep the corner itself in
+ * view. */
 static double farthest_corner(const model *m, const double eye[3], double near_depth)
 {
     double square = 0.0;

@@ -17,7 +17,8 @@ typedef struct setup {
     double load_ms, build_ms;
 } setup;
 
-/* Each returns EXIT_DONE, or another code with the message printed; end with setup_free either way. */
+/* Each returns EXIT_DONE, or another code with the message printed; end with setup_free either
+ * way. */
 int setup_model(setup *s, const options *o); /* the model only */
 int setup_scene(setup *s, const options *o); /* with scene and index */
 void setup_free(setup *s);
@@ -29,8 +30,8 @@ typedef struct views {
     bool is_path; /* rows were asked for with --path */
 } views;
 
-/* Everything: scene, index, cullers and the views, each of which is checked. single: --row picks one.
- * Free with camera_path_free(&out->path) and setup_free. */
+/* Everything: scene, index, cullers and the views, each of which is checked. single: --row picks
+ * one. Free with camera_path_free(&out->path) and setup_free. */
 int setup_views(setup *s, const options *o, bool single, views *out);
 /* Row of view k of the list. */
 uint32_t setup_row(const views *v, uint32_t k);
