@@ -249,20 +249,18 @@ static bool visit_object(walk *w, umb_waiting *item, const umb_heap_entry *entry
 {
     const umb_object *o = &w->scene->objects[item->ref & UMB_REF_NUMBER];
     bool first = !item->waited, hides = o->occluder != UMB_NONE;
+    bool can_wait = w->culler->ops != NULL;
+    bool settled = !can_wait || !(item->settled > entry->key);
+    bool ask = hides ? first || item->stamp != w->drawn : !first || settled;
     item->waited = true;
-    bool ask = first ? hides : !hides || item->stamp != w->drawn;
-    if (w->culler->ops != NULL && ask && !object_shows(w, o, item)) {
+    if (ask && !object_shows(w, o, item)) {
         w->stats.hidden_objects += 1;
         return false;
     }
     if (first) {
         draw(w, o->occluder, item);
     }
-    if (w->culler->ops == NULL || !(item->settled > entry->key)) {
-        if (first && !hides && !object_shows(w, o, item)) {
-            w->stats.hidden_objects += 1;
-            return false;
-        }
+    if (!can_wait || !(item->settled > entry->key)) { /* asking may have moved it either way */
         report(w, item);
         return false;
     }
