@@ -167,8 +167,52 @@ static void test_invariant(void **state)
     assert_true(covered > scenes * 100u);
 }
 
+/* A wall before the eye and, in the same shape, a triangle that the near depth cuts and whose image lies
+ * 10^11 pixels beside the raster: it must neither spoil the wall nor reach outside the buffer. */
+static void test_far_beside(void **state)
+{
+    (void)state;
+    for (int side = -1; side <= 1; side += 2) {
+        float far = 1e8f * (float)side;
+        float p[7][3] = {{-50, -50, -5},  {50, -50, -5},   {50, 50, -5},    {-50, 50, -5},
+                         {far, 0, -0.2f}, {far, 1, -0.2f}, {far, 0, -0.05f}};
+        uint32_t t[9] = {0, 1, 2, 0, 2, 3, 4, 5, 6};
+        uint8_t flags[3] = {UMB_TRIANGLE_TWO_SIDED, UMB_TRIANGLE_TWO_SIDED, UMB_TRIANGLE_TWO_SIDED};
+        umb_scene *scene = NULL;
+        umb_index *index = NULL;
+        umb_culler *culler = NULL;
+        umb_shape shape;
+        uint32_t id;
+        assert_int_equal(umb_scene_create(&(umb_scene_def){0}, &scene), UMB_OK);
+        umb_shape_def def = {.positions = p[0],
+                             .position_count = 7,
+                             .indices = t,
+                             .index_count = 9,
+                             .triangle_flags = flags};
+        assert_int_equal(umb_scene_add_shape(scene, &def, &shape), UMB_OK);
+        umb_object_def wall = {.shape = shape, .flags = UMB_OBJECT_IS_SHAPE};
+        umb_object_def behind = {.bounds = {{-1, -1, -9}, {1, 1, -8}}};
+        assert_int_equal(umb_scene_add_object(scene, &wall, &id), UMB_OK);
+        assert_int_equal(umb_scene_add_object(scene, &behind, &id), UMB_OK);
+        assert_int_equal(umb_scene_commit(scene), UMB_OK);
+        assert_int_equal(umb_index_create(scene, &(umb_index_def){0}, &index), UMB_OK);
+        assert_int_equal(umb_culler_create(index, NULL, &culler), UMB_OK);
+        const double eye[3] = {0, 0, 0}, target[3] = {0, 0, -1}, up[3] = {0, 1, 0};
+        umb_view view;
+        umb_visible_set seen;
+        assert_int_equal(umb_view_look_at(&view, eye, target, up, 1.0, 2.0, 0.1, 100.0), UMB_OK);
+        assert_int_equal(umb_cull(culler, &view, &seen), UMB_OK);
+        assert_int_equal(seen.stats.occluders, 1);
+        assert_int_equal(seen.count, 1); /* the wall; what is behind it is hidden */
+        umb_culler_destroy(culler);
+        umb_index_destroy(index);
+        umb_scene_destroy(scene);
+    }
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_invariant)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_invariant),
+                                       cmocka_unit_test(test_far_beside)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -247,14 +247,14 @@ static overlap place_rect(const umb_depth_triangle *t, double x, double y, doubl
     return holds ? HOLDS : TOUCHES;
 }
 
-/* First and last of count sub-tiles of a size, from an origin, that [low, high] meets; ends
- * clamped. */
+/* First and last of count sub-tiles of a size, from an origin, that [low, high] meets; none if first is
+ * beyond last. Images reach far beyond the raster, so ends are cut before they become whole numbers. */
 static void sub_tile_range(double low, double high, double origin, double size, int count,
                            int *first, int *last)
 {
     double f = (low - origin) / size - 1e-9, l = (high - origin) / size + 1e-9;
-    *first = f > 0.0 ? (int)f : 0;
-    *last = l < count ? (int)l : count - 1;
+    *first = f >= count ? count : f > 0.0 ? (int)f : 0;
+    *last = l < 0.0 ? -1 : l < count ? (int)l : count - 1;
 }
 
 /* All that touch a sub-tile bound its depth together, from the farthest; one that holds all of it
