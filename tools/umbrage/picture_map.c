@@ -175,6 +175,12 @@ static void draw_wall(map *p, double v[3][3], uint32_t object)
     }
 }
 
+/* A whole number within [low, high] of a coordinate that may lie far outside, or be infinite. */
+static int cut_to(double v, double low, double high)
+{
+    return (int)fmax(low, fmin(v, high));
+}
+
 static void draw_surface(map *p, double v[3][3], uint32_t object, uint8_t light)
 {
     double ax = v[1][0] - v[0][0], ay = v[1][1] - v[0][1], az = v[1][2] - v[0][2];
@@ -185,7 +191,7 @@ static void draw_surface(map *p, double v[3][3], uint32_t object, uint8_t light)
     }
     double across = (az * by - bz * ay) / area, down = (bz * ax - az * bx) / area;
     double y0 = fmin(v[0][1], fmin(v[1][1], v[2][1])), y1 = fmax(v[0][1], fmax(v[1][1], v[2][1]));
-    int top = (int)fmax(0, floor(y0)), bottom = (int)fmin(p->height - 1.0, ceil(y1));
+    int top = cut_to(floor(y0), 0, p->height), bottom = cut_to(ceil(y1), -1, p->height - 1.0);
     for (int row = top; row <= bottom; ++row) {
         double y = row + 0.5, low = INFINITY, high = -INFINITY;
         for (int i = 0; i < 3; ++i) {
@@ -196,8 +202,8 @@ static void draw_surface(map *p, double v[3][3], uint32_t object, uint8_t light)
                 high = fmax(high, x);
             }
         }
-        int left = (int)fmax(0, ceil(low - 0.5)),
-            right = (int)fmin(p->width - 1.0, floor(high - 0.5));
+        int left = cut_to(ceil(low - 0.5), 0, p->width);
+        int right = cut_to(floor(high - 0.5), -1, p->width - 1.0);
         for (int x = left; low <= high && x <= right; ++x) {
             double z = v[0][2] + across * (x + 0.5 - v[0][0]) + down * (y - v[0][1]);
             lay(p, x, row, z, object, light);
