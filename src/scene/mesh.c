@@ -6,6 +6,7 @@
 #include "base/scratch.h"
 #include "geometry/collinear.h"
 #include "geometry/transform.h"
+#include "mesh_convex.h"
 #include "mesh_edges.h"
 #include "mesh_parts.h"
 #include "position_hash.h"
@@ -222,6 +223,8 @@ static umb_mesh *pack(const umb_allocator *allocator, const mesh_builder *b, con
     }
     m->bounds = bounds_of((const float(*)[3])m->positions, m->position_count);
     m->block_bounds = bounds_of((const float(*)[3])m->positions, m->block_position_count);
+    m->convex = umb_mesh_convex_test(m);
+    m->box = m->convex && umb_mesh_convex_is_box(m);
     return m;
 }
 

@@ -39,6 +39,11 @@ typedef struct umb_mesh {
     uint32_t seen_count;      /* all triangles */
     uint32_t block_position_count; /* blocking triangles use positions below this; the rest is only seen */
     uint32_t any_two_sided;
+    bool convex;              /* the blocking triangles are the boundary of a convex body that is not flat,
+                                 each point of it once, fronts outwards: at most 128 triangles, none
+                                 two-sided, every edge between two of them. Exact for the positions as
+                                 they are; a transform rounds world vertices, so there it is a hint */
+    bool box;                 /* convex, and its eight vertices are the corners of block_bounds */
     umb_aabb bounds;          /* of all positions that a triangle uses */
     umb_aabb block_bounds;    /* of the blocking triangles; meaningless when there is none */
     size_t bytes;             /* of the one block that holds the mesh and its arrays */
