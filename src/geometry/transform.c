@@ -1,22 +1,24 @@
 #include "transform.h"
 
+#include <string.h>
+
+/* By the bits, in one pass: moving many objects asks for each. Signs of zeros are left out. */
 bool umb_transform_is_identity(const umb_transform *t)
 {
-    bool zero = true, identity = true;
-    for (int i = 0; i < 3; ++i) {
-        for (int j = 0; j < 4; ++j) {
-            zero = zero && t->m[i][j] == 0.0f;
-            identity = identity && t->m[i][j] == (i == j ? 1.0f : 0.0f);
-        }
+    static const uint32_t one[12] = {0x3F800000u, 0, 0, 0, 0,           0x3F800000u,
+                                     0,           0, 0, 0, 0x3F800000u, 0};
+    static const uint32_t no_sign = 0x7FFFFFFFu;
+    uint32_t bits[12], zero = 0, identity = 0;
+    memcpy(bits, t->m, sizeof bits);
+    for (int i = 0; i < 12; ++i) {
+        zero |= bits[i] & no_sign;
+        identity |= one[i] != 0 ? bits[i] ^ one[i] : bits[i] & no_sign;
     }
-    return zero || identity;
+    return zero == 0 || identity == 0;
 }
 
 bool umb_transform_mirrors(const umb_transform *t)
 {
-    if (umb_transform_is_identity(t)) {
-        return false;
-    }
     umb_vec3 rows[3];
     for (int i = 0; i < 3; ++i) {
         rows[i] = umb_vec3_from_float(t->m[i]);

@@ -26,18 +26,27 @@ void umb_node_pad(umb_node *node)
     }
 }
 
+static inline float lower(float a, float b)
+{
+    return a < b ? a : b;
+}
+
+static inline float higher(float a, float b)
+{
+    return a > b ? a : b;
+}
+
+/* In halves: three steps deep instead of seven. */
 umb_aabb umb_node_bounds(const umb_node *node)
 {
     umb_aabb b;
     for (int i = 0; i < 3; ++i) {
-        float low = node->min[i][0];
-        float high = node->max[i][0];
-        for (uint32_t slot = 1; slot < node->count; ++slot) {
-            low = node->min[i][slot] < low ? node->min[i][slot] : low;
-            high = node->max[i][slot] > high ? node->max[i][slot] : high;
-        }
-        b.min[i] = low;
-        b.max[i] = high;
+        const float *l = node->min[i];
+        const float *h = node->max[i];
+        b.min[i] = lower(lower(lower(l[0], l[4]), lower(l[2], l[6])),
+                         lower(lower(l[1], l[5]), lower(l[3], l[7])));
+        b.max[i] = higher(higher(higher(h[0], h[4]), higher(h[2], h[6])),
+                          higher(higher(h[1], h[5]), higher(h[3], h[7])));
     }
     return b;
 }
@@ -116,6 +125,7 @@ static void emit(emitter *e, uint32_t split, uint32_t number, uint32_t parent)
         if ((slots[i] & UMB_BVH_ITEM) == 0) {
             uint32_t child = node->ref[i];
             emit(e, slots[i], child, number);
+            e->nodes[child].slot = i;
             umb_aabb box = umb_node_bounds(&e->nodes[child]);
             set_slot(node, i, box.min, box.max, child);
         }
@@ -193,31 +203,97 @@ void umb_bvh_find_places(const umb_node *nodes, uint32_t node_count, uint32_t *p
     }
 }
 
-static void lift(umb_node *nodes, uint32_t number, uint32_t slot, umb_aabb box)
+/* ---- refitting what moved ------------------------------------------------------------------- */
+
+umb_result umb_bvh_marks_create(umb_bvh_marks *marks, const umb_allocator *a, uint32_t node_count)
 {
-    for (;;) {
-        umb_node *node = &nodes[number];
-        umb_aabb before = umb_node_bounds(node);
-        set_slot(node, slot, box.min, box.max, node->ref[slot]);
+    *marks = (umb_bvh_marks){0};
+    size_t node_words = (size_t)node_count / 64 + 1;
+    size_t word_words = node_words / 64 + 1;
+    marks->nodes = umb_memory_allocate_zero(a, node_words + word_words, sizeof(marks->nodes[0]));
+    if (marks->nodes == NULL) {
+        return UMB_ERROR_MEMORY;
+    }
+    marks->words = marks->nodes + node_words;
+    marks->node_words = node_words;
+    marks->word_words = word_words;
+    return UMB_OK;
+}
+
+size_t umb_bvh_marks_memory(const umb_bvh_marks *marks)
+{
+    return (marks->node_words + marks->word_words) * sizeof(marks->nodes[0]);
+}
+
+void umb_bvh_marks_free(umb_bvh_marks *marks, const umb_allocator *a)
+{
+    umb_memory_free(a, marks->nodes, umb_bvh_marks_memory(marks));
+    *marks = (umb_bvh_marks){0};
+}
+
+static inline void mark(const umb_bvh_marks *marks, uint32_t node)
+{
+    marks->nodes[node >> 6] |= (uint64_t)1 << (node & 63);
+    marks->words[node >> 12] |= (uint64_t)1 << (node >> 6 & 63);
+}
+
+static inline uint32_t highest(uint64_t word)
+{
+    return 63 - (uint32_t)__builtin_clzll(word);
+}
+
+/* Bring a marked node's box up to its parent, which is marked when that changes it. By bits, so
+ * that the result is that of a full refit to the sign of a zero. */
+static inline void lift(umb_node *nodes, const umb_bvh_marks *marks, uint32_t number)
+{
+    umb_node *node = &nodes[number];
+    if (node->count < UMB_NODE_WIDTH) {
         umb_node_pad(node);
-        box = umb_node_bounds(node);
-        /* By bits, so that the result is that of a full refit to the sign of a zero. */
-        if (node->parent == UMB_NONE || memcmp(&before, &box, sizeof(box)) == 0) {
-            return;
-        }
-        for (slot = 0; nodes[node->parent].ref[slot] != (UMB_REF_NODE | number); ++slot) {
-        }
-        number = node->parent;
+    }
+    if (node->parent == UMB_NONE) {
+        return;
+    }
+    umb_aabb box = umb_node_bounds(node);
+    umb_node *parent = &nodes[node->parent];
+    umb_aabb before;
+    for (int i = 0; i < 3; ++i) {
+        before.min[i] = parent->min[i][node->slot];
+        before.max[i] = parent->max[i][node->slot];
+    }
+    if (memcmp(&before, &box, sizeof(box)) != 0) {
+        set_slot(parent, node->slot, box.min, box.max, UMB_REF_NODE | number);
+        mark(marks, node->parent);
     }
 }
 
-void umb_bvh_refit_moved(umb_node *nodes, const uint32_t *places, const umb_committed *scene)
+/* A node marks none but its parent, whose number is lower: a word that is left is done with. */
+static void lift_all(umb_node *nodes, const umb_bvh_marks *marks)
+{
+    for (size_t w = marks->word_words; w-- > 0;) {
+        while (marks->words[w] != 0) {
+            size_t n = w << 6 | highest(marks->words[w]);
+            while (marks->nodes[n] != 0) {
+                uint32_t bit = highest(marks->nodes[n]);
+                marks->nodes[n] &= ~((uint64_t)1 << bit);
+                lift(nodes, marks, (uint32_t)(n << 6 | bit));
+            }
+            marks->words[w] &= ~((uint64_t)1 << (n & 63));
+        }
+    }
+}
+
+void umb_bvh_refit_moved(umb_node *nodes, umb_bvh_marks *marks, const uint32_t *places,
+                         const umb_committed *scene)
 {
     for (uint32_t i = 0; i < scene->moved_count; ++i) {
         uint32_t place = places[scene->moved[i]];
         if (place != UMB_NONE) {
-            lift(nodes, place / UMB_NODE_WIDTH, place % UMB_NODE_WIDTH,
-                 scene->objects[scene->moved[i]].bounds);
+            const umb_aabb *box = &scene->objects[scene->moved[i]].bounds;
+            umb_node *node = &nodes[place / UMB_NODE_WIDTH];
+            uint32_t slot = place % UMB_NODE_WIDTH;
+            set_slot(node, slot, box->min, box->max, node->ref[slot]);
+            mark(marks, place / UMB_NODE_WIDTH);
         }
     }
+    lift_all(nodes, marks);
 }

@@ -26,13 +26,27 @@ void umb_bvh_refit(umb_node *nodes, uint32_t node_count, const umb_committed *sc
  * entries. */
 void umb_bvh_find_places(const umb_node *nodes, uint32_t node_count, uint32_t *places,
                          uint32_t object_count);
-/* The same as umb_bvh_refit() when only the committed `moved` objects moved: from each of them up,
- * as far as boxes change. */
-void umb_bvh_refit_moved(umb_node *nodes, const uint32_t *places, const umb_committed *scene);
+
+/* A set of node numbers that gives back its highest first: children before their parents. Empty
+ * between refits. */
+typedef struct umb_bvh_marks {
+    uint64_t *nodes; /* a bit each */
+    uint64_t *words; /* a bit for each word of nodes that is not zero */
+    size_t node_words, word_words;
+} umb_bvh_marks;
+
+umb_result umb_bvh_marks_create(umb_bvh_marks *marks, const umb_allocator *a, uint32_t node_count);
+void umb_bvh_marks_free(umb_bvh_marks *marks, const umb_allocator *a);
+size_t umb_bvh_marks_memory(const umb_bvh_marks *marks);
+
+/* The same as umb_bvh_refit() when only the committed `moved` objects moved: from these up, as far
+ * as boxes change, each node once. Costs nothing for nodes that stay as they are. */
+void umb_bvh_refit_moved(umb_node *nodes, umb_bvh_marks *marks, const uint32_t *places,
+                         const umb_committed *scene);
 
 /* Make the slots from count on as the layout wants them: slot 0's box, no reference. */
 void umb_node_pad(umb_node *node);
-/* Box around a node's slots. */
+/* Box around the slots of a padded node. */
 umb_aabb umb_node_bounds(const umb_node *node);
 
 /* Split items into a binary tree; bvh_split.c. Node k of the tree splits its items between k - 1

@@ -7,6 +7,7 @@ struct umb_index {
     umb_tree tree;
     umb_node *nodes;  /* what tree.nodes points at */
     uint32_t *places; /* of each object (umb_bvh_find_places) */
+    umb_bvh_marks marks;
     umb_scene *scene;
     umb_scene_listener listener;
     umb_allocator allocator;
@@ -102,20 +103,25 @@ static void drop(umb_index *index)
     umb_memory_free(&index->allocator, index->nodes, index->tree.node_count * sizeof(umb_node));
     umb_memory_free(&index->allocator, index->places,
                     index->object_count * sizeof(index->places[0]));
+    umb_bvh_marks_free(&index->marks, &index->allocator);
 }
 
 /* Take over new nodes, or free them when there is no memory to follow their objects. */
 static umb_result adopt(umb_index *index, const umb_committed *c, umb_node *nodes,
                         uint32_t node_count, uint32_t item_count)
 {
-    uint32_t *places = umb_memory_allocate(&index->allocator, c->object_count * sizeof(places[0]));
-    if (places == NULL) {
-        umb_memory_free(&index->allocator, nodes, node_count * sizeof(umb_node));
+    const umb_allocator *a = &index->allocator;
+    uint32_t *places = umb_memory_allocate(a, c->object_count * sizeof(places[0]));
+    umb_bvh_marks marks = {0};
+    if (places == NULL || umb_bvh_marks_create(&marks, a, node_count) != UMB_OK) {
+        umb_memory_free(a, places, c->object_count * sizeof(places[0]));
+        umb_memory_free(a, nodes, node_count * sizeof(umb_node));
         return UMB_ERROR_MEMORY;
     }
     drop(index);
     umb_bvh_find_places(nodes, node_count, places, c->object_count);
     index->places = places;
+    index->marks = marks;
     index->nodes = nodes;
     index->tree.nodes = nodes;
     index->tree.node_count = node_count;
@@ -173,11 +179,9 @@ static umb_result update(void *user)
         return UMB_OK;
     }
     if (only_moved(index, c)) {
-        /* A few moves since the version shown: only their ways to the root. */
-        bool few = index->tree.version + 1 == c->version &&
-                   c->moved_count < index->tree.item_count / 16;
-        if (few) {
-            umb_bvh_refit_moved(index->nodes, index->places, c);
+        /* One commit since the version shown: its list of moves is all of them. */
+        if (index->tree.version + 1 == c->version) {
+            umb_bvh_refit_moved(index->nodes, &index->marks, index->places, c);
         } else {
             umb_bvh_refit(index->nodes, index->tree.node_count, c);
         }
@@ -235,6 +239,7 @@ static bool restore_node(restorer *r, uint32_t k, const uint32_t refs[UMB_NODE_W
         r->seen[place] = 1;
         if ((ref & UMB_REF_KIND) == UMB_REF_NODE) {
             r->nodes[ref].parent = k;
+            r->nodes[ref].slot = node->count;
         } else {
             r->item_count += 1;
         }
@@ -401,7 +406,8 @@ void umb_index_get_stats(const umb_index *index, umb_index_stats *out)
     out->depth = tree_depth(tree);
     out->cost = tree_cost(tree);
     out->bytes = sizeof(*index) + tree->node_count * sizeof(umb_node) +
-                 index->object_count * sizeof(index->places[0]);
+                 index->object_count * sizeof(index->places[0]) +
+                 umb_bvh_marks_memory(&index->marks);
 }
 
 const char *umb_index_kind_name(umb_index_kind kind)

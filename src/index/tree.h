@@ -23,7 +23,8 @@ typedef struct umb_node {
     uint32_t ref[UMB_NODE_WIDTH];
     uint32_t count;
     uint32_t parent; /* node number, UMB_NONE for the root */
-    uint32_t pad[6];
+    uint32_t slot;   /* of this node in its parent; 0 for the root */
+    uint32_t pad[5];
 } umb_node;
 
 typedef struct umb_tree {

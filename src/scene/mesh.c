@@ -287,42 +287,88 @@ void umb_mesh_destroy(const umb_allocator *allocator, umb_mesh *mesh)
     }
 }
 
-/* True if each row looks at one axis at most: then rounding keeps order along it, and the image of
- * the box's corners is exactly the box of the images. */
+/* ---- in the world --------------------------------------------------------------------------- */
+
+/* True if each row looks at one axis at most. */
 static bool keeps_boxes(const umb_transform *t)
 {
+    bool oblique = false;
     for (int i = 0; i < 3; ++i) {
-        if ((t->m[i][0] != 0.0f) + (t->m[i][1] != 0.0f) + (t->m[i][2] != 0.0f) > 1) {
-            return false;
-        }
+        bool x = t->m[i][0] != 0.0f, y = t->m[i][1] != 0.0f, z = t->m[i][2] != 0.0f;
+        oblique |= (x & y) | (y & z) | (z & x);
     }
-    return true;
+    return !oblique;
 }
 
-umb_aabb umb_mesh_world_bounds(const umb_mesh *mesh, const umb_transform *transform,
-                               bool blocking_only)
+static inline double lower(double a, double b)
 {
-    const umb_aabb *own = blocking_only ? &mesh->block_bounds : &mesh->bounds;
-    if (umb_transform_is_identity(transform)) {
-        return *own;
-    }
-    float corners[2][3];
-    const float(*points)[3] = (const float(*)[3])mesh->positions;
-    uint32_t count = blocking_only ? mesh->block_position_count : mesh->position_count;
-    if (keeps_boxes(transform)) {
-        memcpy(corners[0], own->min, sizeof corners[0]);
-        memcpy(corners[1], own->max, sizeof corners[1]);
-        points = (const float(*)[3])corners;
-        count = 2;
-    }
-    umb_aabb box = {{0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}};
-    for (uint32_t i = 0; i < count; ++i) {
-        float p[3];
-        umb_transform_point(transform, points[i], p);
+    return a < b ? a : b;
+}
+
+static inline double higher(double a, double b)
+{
+    return a > b ? a : b;
+}
+
+/* Box of the images of a box's corners. Rounding keeps order, in every step of the sum: the least
+ * of the eight sums is the sum of the least products. */
+static umb_aabb move_corners(const umb_aabb *box, const umb_transform *t)
+{
+    umb_aabb out;
+    for (int i = 0; i < 3; ++i) {
+        double low = 0.0, high = 0.0;
         for (int k = 0; k < 3; ++k) {
-            box.min[k] = i == 0 || p[k] < box.min[k] ? p[k] : box.min[k];
-            box.max[k] = i == 0 || p[k] > box.max[k] ? p[k] : box.max[k];
+            double a = (double)t->m[i][k] * box->min[k];
+            double b = (double)t->m[i][k] * box->max[k];
+            low += lower(a, b);
+            high += higher(a, b);
+        }
+        out.min[i] = (float)(low + (double)t->m[i][3]);
+        out.max[i] = (float)(high + (double)t->m[i][3]);
+    }
+    return out;
+}
+
+/* Box of the images of points. Rounding keeps order: it can wait for the end. */
+static umb_aabb move_points(const float (*points)[3], uint32_t count, const umb_transform *t)
+{
+    double low[3] = {INFINITY, INFINITY, INFINITY};
+    double high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    for (uint32_t p = 0; p < count; ++p) {
+        double x = points[p][0], y = points[p][1], z = points[p][2];
+        for (int i = 0; i < 3; ++i) {
+            double sum = t->m[i][0] * x + t->m[i][1] * y + t->m[i][2] * z + (double)t->m[i][3];
+            low[i] = lower(sum, low[i]);
+            high[i] = higher(sum, high[i]);
         }
     }
-    return box;
+    umb_aabb out;
+    for (int i = 0; i < 3; ++i) {
+        out.min[i] = (float)low[i];
+        out.max[i] = (float)high[i];
+    }
+    return out;
+}
+
+umb_mesh_place umb_mesh_world_bounds(const umb_mesh *mesh, const umb_transform *transform)
+{
+    umb_mesh_place place = {.block_bounds = {{0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}}};
+    bool same = mesh->block_position_count == mesh->position_count;
+    bool any = mesh->block_position_count > 0;
+    if ((mesh->box && same) || keeps_boxes(transform)) {
+        place.bounds = move_corners(&mesh->bounds, transform);
+        if (any && !same) {
+            place.block_bounds = move_corners(&mesh->block_bounds, transform);
+        }
+    } else {
+        const float(*points)[3] = (const float(*)[3])mesh->positions;
+        place.bounds = move_points(points, mesh->position_count, transform);
+        if (any && !same) {
+            place.block_bounds = move_points(points, mesh->block_position_count, transform);
+        }
+    }
+    if (same) {
+        place.block_bounds = place.bounds;
+    }
+    return place;
 }

@@ -28,24 +28,26 @@ typedef struct umb_part {
 } umb_part;
 
 typedef struct umb_mesh {
+    /* What a move looks at comes first: one cache line. */
+    umb_aabb bounds;          /* of all positions that a triangle uses */
+    umb_aabb block_bounds;    /* of the blocking triangles; meaningless when there is none */
+    uint32_t position_count;
+    uint32_t block_position_count; /* blocking triangles use positions below this; the rest is only seen */
+    uint32_t triangle_count;  /* blocking triangles */
+    bool convex;              /* the blocking triangles are the boundary of a convex body that is not flat,
+                                 each point of it once, fronts outwards: at most 128 triangles, none
+                                 two-sided, every edge between two of them. Exact for the positions as
+                                 they are; a transform rounds world vertices, so there it is a hint */
+    bool box;                 /* convex, and its eight vertices are the corners of block_bounds */
+    uint32_t seen_count;      /* all triangles */
+    uint32_t edge_count, part_count;
+    uint32_t any_two_sided;
     float (*positions)[3];
     uint32_t (*triangles)[3]; /* the blocking ones first: not OPEN, not of zero area in exact arithmetic */
     uint8_t *two_sided;       /* per blocking triangle: 1 or 0 */
     umb_edge *edges;
     umb_part *parts; /* hold every triangle, OPEN and degenerate ones too */
     uint32_t *part_order;     /* every triangle once, by parts */
-    uint32_t position_count, edge_count, part_count;
-    uint32_t triangle_count;  /* blocking triangles */
-    uint32_t seen_count;      /* all triangles */
-    uint32_t block_position_count; /* blocking triangles use positions below this; the rest is only seen */
-    uint32_t any_two_sided;
-    bool convex;              /* the blocking triangles are the boundary of a convex body that is not flat,
-                                 each point of it once, fronts outwards: at most 128 triangles, none
-                                 two-sided, every edge between two of them. Exact for the positions as
-                                 they are; a transform rounds world vertices, so there it is a hint */
-    bool box;                 /* convex, and its eight vertices are the corners of block_bounds */
-    umb_aabb bounds;          /* of all positions that a triangle uses */
-    umb_aabb block_bounds;    /* of the blocking triangles; meaningless when there is none */
     size_t bytes;             /* of the one block that holds the mesh and its arrays */
 } umb_mesh;
 
@@ -62,8 +64,13 @@ void umb_mesh_destroy(const umb_allocator *allocator, umb_mesh *mesh);
  * of sizes say how long each is. NULL when there is no memory. */
 umb_mesh *umb_mesh_allocate(const umb_allocator *allocator, const umb_mesh *sizes);
 
-/* Box of positions [0, count) of the mesh under a transform, of the world vertices themselves. The
- * box has infinities where a vertex leaves the range of floats. */
-umb_aabb umb_mesh_world_bounds(const umb_mesh *mesh, const umb_transform *transform, bool blocking_only);
+/* Boxes of the world vertices: of all, and of those of blocking triangles (zero when there is none).
+ * They are those of what umb_transform_point() gives, to the bit but for the signs of zeros. Entries
+ * are not finite where a vertex leaves the range of floats. */
+typedef struct umb_mesh_place {
+    umb_aabb bounds, block_bounds;
+} umb_mesh_place;
+
+umb_mesh_place umb_mesh_world_bounds(const umb_mesh *mesh, const umb_transform *transform);
 
 #endif

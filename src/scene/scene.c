@@ -1,5 +1,6 @@
 #include "scene.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -129,14 +130,14 @@ umb_result umb_scene_add_shape(umb_scene *scene, const umb_shape_def *def, umb_s
     }
 }
 
-static bool box_is_finite(const umb_aabb *b)
+/* Finite and not inverted; false for NaN. */
+static bool box_is_possible(const umb_aabb *b)
 {
+    bool possible = true;
     for (int i = 0; i < 3; ++i) {
-        if (!isfinite(b->min[i]) || !isfinite(b->max[i])) {
-            return false;
-        }
+        possible &= (b->min[i] >= -FLT_MAX) & (b->max[i] <= FLT_MAX) & (b->min[i] <= b->max[i]);
     }
-    return true;
+    return possible;
 }
 
 static bool box_is_zero(const umb_aabb *b)
@@ -149,58 +150,65 @@ static bool box_is_zero(const umb_aabb *b)
     return true;
 }
 
-/* Put a shape somewhere, if the place is possible. */
+/* By the bits: without a branch, and four at once where the compiler can. */
+static bool transform_is_finite(const umb_transform *t)
+{
+    uint32_t bits[12], bad = 0;
+    memcpy(bits, t->m, sizeof bits);
+    for (int i = 0; i < 12; ++i) {
+        bad |= (bits[i] & 0x7F800000u) == 0x7F800000u;
+    }
+    return bad == 0;
+}
+
+/* Put a shape somewhere, if the place is possible. *own is the box of its vertices there, of all
+ * that can be seen; as it was without a shape. */
 static umb_result place(const umb_scene *scene, umb_shape shape, const umb_transform *transform,
-                        umb_placement *out)
+                        umb_placement *out, umb_aabb *own)
 {
     static const umb_transform identity = {{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
     if (shape > scene->shape_count) {
         return umb_scene_fail(scene, UMB_ERROR_ARGUMENT, "no shape has number %u", shape);
     }
-    umb_placement p = {.transform = identity, .shape = shape, .identity = true};
-    if (transform != NULL && !umb_transform_is_identity(transform)) {
-        for (int i = 0; i < 12; ++i) {
-            if (!isfinite(transform->m[i / 4][i % 4])) {
-                return umb_scene_fail(scene, UMB_ERROR_ARGUMENT, "a transform is not finite");
-            }
-        }
-        p.transform = *transform;
-        p.identity = false;
-        p.mirrored = umb_transform_mirrors(transform);
-    }
     const umb_mesh *mesh = umb_scene_mesh(scene, shape);
-    if (mesh != NULL && mesh->triangle_count > 0) {
-        p.block_bounds = umb_mesh_world_bounds(mesh, &p.transform, true);
-        if (!box_is_finite(&p.block_bounds)) {
+    bool stays = transform == NULL || umb_transform_is_identity(transform);
+    *out = (umb_placement){
+        .transform = stays ? identity : *transform, .shape = shape, .identity = stays};
+    if (!stays) {
+        if (!transform_is_finite(transform)) {
+            return umb_scene_fail(scene, UMB_ERROR_ARGUMENT, "a transform is not finite");
+        }
+        out->mirrored = umb_transform_mirrors(transform);
+    }
+    if (mesh != NULL) {
+        umb_mesh_place moved = {mesh->bounds, mesh->block_bounds};
+        if (!stays) {
+            moved = umb_mesh_world_bounds(mesh, transform);
+        }
+        if (!box_is_possible(&moved.block_bounds)) {
             return umb_scene_fail(scene, UMB_ERROR_ARGUMENT,
                                   "a transform moves vertices out of range");
         }
+        out->block_bounds = moved.block_bounds;
+        *own = moved.bounds;
     }
-    *out = p;
     return UMB_OK;
 }
 
-/* The bounds of an object: those given, or the shape's own. */
-static umb_result choose_bounds(const umb_scene *scene, const umb_placement *placement,
-                                const umb_aabb *given, umb_aabb *out)
+/* The bounds of an object: those given, or the shape's own, which *box holds if there is one. */
+static umb_result choose_bounds(const umb_scene *scene, umb_shape shape, const umb_aabb *given,
+                                umb_aabb *box)
 {
-    const umb_mesh *mesh = umb_scene_mesh(scene, placement->shape);
-    if (given == NULL && mesh == NULL) {
+    if (given == NULL && shape == 0) {
         return umb_scene_fail(scene, UMB_ERROR_ARGUMENT, "an object without a shape needs bounds");
     }
-    umb_aabb box;
-    if (given == NULL || (mesh != NULL && box_is_zero(given))) {
-        box = umb_mesh_world_bounds(mesh, &placement->transform, false);
-    } else {
-        box = *given;
+    if (given != NULL && (shape == 0 || !box_is_zero(given))) {
+        *box = *given;
     }
-    for (int i = 0; i < 3; ++i) {
-        if (!isfinite(box.min[i]) || !isfinite(box.max[i]) || box.min[i] > box.max[i]) {
-            return umb_scene_fail(scene, UMB_ERROR_ARGUMENT,
-                                  "an object's bounds are not finite or inverted");
-        }
+    if (!box_is_possible(box)) {
+        return umb_scene_fail(scene, UMB_ERROR_ARGUMENT,
+                              "an object's bounds are not finite or inverted");
     }
-    *out = box;
     return UMB_OK;
 }
 
@@ -211,9 +219,9 @@ umb_result umb_scene_add_object(umb_scene *scene, const umb_object_def *def, uin
     }
     *out = UMB_NONE;
     umb_object_slot slot = {.flags = def->flags, .weld = UMB_NONE, .state = UMB_SLOT_USED};
-    umb_result result = place(scene, def->shape, &def->transform, &slot.placement);
+    umb_result result = place(scene, def->shape, &def->transform, &slot.placement, &slot.bounds);
     if (result == UMB_OK) {
-        result = choose_bounds(scene, &slot.placement, &def->bounds, &slot.bounds);
+        result = choose_bounds(scene, def->shape, &def->bounds, &slot.bounds);
     }
     if (result != UMB_OK) {
         return result;
@@ -258,10 +266,10 @@ umb_result umb_scene_move_object(umb_scene *scene, uint32_t object, const umb_tr
         return fail_object(scene, object);
     }
     umb_placement placement;
-    umb_aabb box;
-    umb_result result = place(scene, slot->placement.shape, transform, &placement);
+    umb_aabb box = {{0, 0, 0}, {0, 0, 0}};
+    umb_result result = place(scene, slot->placement.shape, transform, &placement, &box);
     if (result == UMB_OK) {
-        result = choose_bounds(scene, &placement, bounds, &box);
+        result = choose_bounds(scene, placement.shape, bounds, &box);
     }
     if (result != UMB_OK) {
         return result;
@@ -312,7 +320,8 @@ umb_result umb_scene_add_occluder(umb_scene *scene, umb_shape shape, const umb_t
     }
     *out = UMB_NONE;
     umb_occluder_slot slot = {.state = UMB_SLOT_USED};
-    umb_result result = place(scene, shape, transform, &slot.placement);
+    umb_aabb own;
+    umb_result result = place(scene, shape, transform, &slot.placement, &own);
     if (result != UMB_OK) {
         return result;
     }

@@ -130,19 +130,31 @@ static umb_result commit_structure(umb_scene *scene)
     return UMB_OK;
 }
 
+/* Only what a move changes. The two lists of moved objects change places. */
 static void commit_moved(umb_scene *scene)
 {
     for (uint32_t i = 0; i < scene->moved_count; ++i) {
-        uint32_t id = scene->moved[i];
-        umb_object_slot *slot = &scene->objects[id];
-        uint32_t occluder = scene->committed_objects[id].occluder;
-        scene->committed_objects[id] = make_object(scene, slot, occluder);
-        if (occluder != UMB_NONE) {
-            scene->committed_occluders[occluder] = make_occluder(scene, &slot->placement, id);
+        umb_object_slot *slot = &scene->objects[scene->moved[i]];
+        const umb_placement *p = &slot->placement;
+        umb_object *object = &scene->committed_objects[scene->moved[i]];
+        object->bounds = slot->bounds;
+        object->transform = p->transform;
+        object->identity = p->identity;
+        if (object->occluder != UMB_NONE) {
+            umb_occluder *occluder = &scene->committed_occluders[object->occluder];
+            occluder->transform = p->transform;
+            occluder->bounds = p->block_bounds;
+            occluder->identity = p->identity;
+            occluder->mirrored = p->mirrored;
         }
         slot->moved = false;
-        scene->committed_moved[i] = id;
     }
+    uint32_t *moved = scene->moved;
+    size_t capacity = scene->moved_capacity;
+    scene->moved = scene->committed_moved;
+    scene->moved_capacity = scene->committed_moved_capacity;
+    scene->committed_moved = moved;
+    scene->committed_moved_capacity = capacity;
     scene->committed.moved_count = scene->moved_count;
 }
 
