@@ -8,6 +8,7 @@
 #include "cull.h"
 #include "geometry.h"
 #include "index.h"
+#include "light.h"
 #include "scene.h"
 #include "view.h"
 
