@@ -61,6 +61,7 @@ static uint32_t walk(const umb_tree *t, const umb_committed *c, uint32_t node, u
         case UMB_REF_NODE: {
             assert_true(number > node && number < t->node_count);
             assert_int_equal(t->nodes[number].parent, node);
+            assert_int_equal(t->nodes[number].slot, s);
             umb_aabb below = umb_node_bounds(&t->nodes[number]);
             assert_memory_equal(&box, &below, sizeof(box));
             nodes += walk(t, c, number, objects, occluders);
@@ -125,6 +126,7 @@ static void check_index(const umb_index *index)
 
 /* ---- scenes ------------------------------------------------------------------------------------- */
 
+enum { COUNT_LARGE = 60000 };
 enum { SPREAD, EQUAL, POINTS, COLLINEAR, GEOMETRIC, NESTED, ABSURD, SET_COUNT };
 
 static umb_aabb box_of_set(uint64_t *seed, int set, uint32_t i)
@@ -300,6 +302,37 @@ static void test_commits(void **state)
     assert_int_equal(umb_scene_commit(scene), UMB_OK);
     umb_index_destroy(indices[1]);
     umb_index_destroy(NULL);
+    umb_scene_destroy(scene);
+}
+
+/* Any number of moves, in a tree of many thousand nodes, gives what a full refit gives. */
+static void test_moves_in_a_large_tree(void **state)
+{
+    (void)state;
+    static const uint32_t moves[] = {1, 2, 30, 500, 9000, COUNT_LARGE};
+    static const double origin[3] = {0, 0, 0};
+    uint64_t seed = 36;
+    umb_scene *scene = make_scene(37, SPREAD, COUNT_LARGE);
+    umb_index *index;
+    assert_int_equal(umb_index_create(scene, NULL, &index), UMB_OK);
+    const umb_tree *tree = umb_index_tree(index);
+    assert_true(tree->node_count > 8192);
+    umb_node *copy = malloc(tree->node_count * sizeof(copy[0]));
+    assert_non_null(copy);
+    memcpy(copy, tree->nodes, tree->node_count * sizeof(copy[0]));
+    for (size_t i = 0; i < sizeof(moves) / sizeof(moves[0]); ++i) {
+        for (uint32_t k = 0; k < moves[i]; ++k) {
+            uint32_t id = moves[i] == COUNT_LARGE ? k : random_below(&seed, COUNT_LARGE);
+            umb_aabb box = random_box(&seed, origin, 100.0);
+            assert_int_equal(umb_scene_move_object(scene, id, NULL, &box), UMB_OK);
+        }
+        assert_int_equal(umb_scene_commit(scene), UMB_OK);
+        umb_bvh_refit(copy, tree->node_count, umb_scene_committed(scene));
+        assert_memory_equal(copy, tree->nodes, tree->node_count * sizeof(copy[0]));
+    }
+    check_index(index);
+    free(copy);
+    umb_index_destroy(index);
     umb_scene_destroy(scene);
 }
 
@@ -535,7 +568,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_all_sets),       cmocka_unit_test(test_flat_order),
-        cmocka_unit_test(test_commits),        cmocka_unit_test(test_same_for_any_workers),
+        cmocka_unit_test(test_commits),
+        cmocka_unit_test(test_moves_in_a_large_tree),        cmocka_unit_test(test_same_for_any_workers),
         cmocka_unit_test(test_quality),        cmocka_unit_test(test_failing_allocations),
         cmocka_unit_test(test_failing_commit), cmocka_unit_test(test_bad_kind),
         cmocka_unit_test(test_queries),
