@@ -45,7 +45,7 @@ bench: deps ## measure: build/bench
 	@$(BUILD) build/bench -j $(JOBS)
 	@scripts/bench
 
-soak: build ## the long run: every scene, every view, ten thousand micro-scenes
+soak: build ## the long run: a thousand million object-view pairs against the oracle
 	@scripts/soak
 
 fuzz: deps ## fuzz every reader: FUZZ_SECONDS (60) each

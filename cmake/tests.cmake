@@ -44,6 +44,12 @@ foreach(source ${UMB_TEST_SOURCES})
   endif()
 endforeach()
 
+# tests/soak: the long run, one program; `make soak` runs all of it, the tests its short plan.
+file(GLOB UMB_SOAK_SOURCES CONFIGURE_DEPENDS tests/soak/*.c)
+add_executable(soak ${UMB_SOAK_SOURCES})
+target_link_libraries(soak PRIVATE umb_test_support ${UMB_INSIDE} PkgConfig::XXHASH Threads::Threads m)
+umb_add_test(soak soak bash ${CMAKE_SOURCE_DIR}/tests/soak/soak.sh $<TARGET_FILE:soak>)
+
 # tests/cli/NAME.sh is run with UMBRAGE_PROGRAM set; beside it NAME.expected is what it must print.
 if(TARGET umbrage-program)
   file(GLOB UMB_CLI_TESTS CONFIGURE_DEPENDS tests/cli/*.sh)

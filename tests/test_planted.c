@@ -11,87 +11,9 @@
 #include <cmocka.h>
 
 #include "support/micro_scenes.h"
+#include "support/planted.h"
 #include "support/real_scenes.h"
 #include "support/strict.h"
-
-typedef enum plant { PLANT_NONE, PLANT_SMALL_OBJECTS, PLANT_LARGE_OCCLUDERS, PLANT_COUNT } plant;
-
-static const char *const PLANT_NAMES[PLANT_COUNT] = {"no mistake", "objects shrunk by 1%",
-                                                     "occluders inflated by 1%"};
-
-/* The transform followed by a scaling about the middle of the bounds. */
-static umb_transform scaled(const model_object *o, double factor)
-{
-    umb_transform t = o->transform;
-    for (int i = 0; factor != 1.0 && i < 3; ++i) {
-        double centre = 0.5 * ((double)o->bounds.min[i] + o->bounds.max[i]);
-        for (int j = 0; j < 4; ++j) {
-            t.m[i][j] = (float)(factor * t.m[i][j] + (j == 3 ? (1.0 - factor) * centre : 0.0));
-        }
-    }
-    return t;
-}
-
-static void add(umb_scene *scene, umb_shape shape, const model_object *o, double factor,
-                uint32_t flags, uint32_t expected)
-{
-    umb_object_def def = {.shape = shape,
-                          .transform = scaled(o, factor),
-                          .flags = flags | (shape == 0 ? UMB_OBJECT_IGNORED : UMB_OBJECT_IS_SHAPE)};
-    uint32_t id = UMB_NONE;
-    assert_int_equal(umb_scene_add_object(scene, &def, &id), UMB_OK);
-    assert_int_equal(id, expected);
-}
-
-/* Each object of the model twice: numbered as in the model what is tested and never hides, after
- * those what hides. Either can have its mistake. */
-static umb_scene *planted_scene(const model *m, plant what, bool weld)
-{
-    umb_scene *scene = NULL;
-    umb_shape *shapes = calloc((size_t)m->mesh_count + 1, sizeof *shapes);
-    assert_non_null(shapes);
-    assert_int_equal(umb_scene_create(NULL, &scene), UMB_OK);
-    for (uint32_t i = 0; i < m->mesh_count; ++i) {
-        const model_mesh *mesh = &m->meshes[i];
-        umb_shape_def def = {.positions = mesh->positions,
-                             .position_count = mesh->position_count,
-                             .indices = mesh->indices,
-                             .index_count = mesh->triangle_count * 3,
-                             .triangle_flags = mesh->flags};
-        if (mesh->triangle_count != 0) {
-            assert_int_equal(umb_scene_add_shape(scene, &def, &shapes[i]), UMB_OK);
-        }
-    }
-    for (uint32_t i = 0; i < 2 * m->object_count; ++i) {
-        bool hides = i >= m->object_count;
-        const model_object *o = &m->objects[hides ? i - m->object_count : i];
-        double factor = !hides && what == PLANT_SMALL_OBJECTS    ? 0.99
-                        : hides && what == PLANT_LARGE_OCCLUDERS ? 1.01
-                                                                 : 1.0;
-        add(scene, o->mesh != MODEL_NONE ? shapes[o->mesh] : 0, o, factor,
-            hides ? UMB_OBJECT_STATIC : UMB_OBJECT_NEVER_HIDES, i);
-    }
-    free(shapes);
-    if (weld) {
-        assert_int_equal(umb_scene_weld(scene, NULL, NULL), UMB_OK);
-    }
-    assert_int_equal(umb_scene_commit(scene), UMB_OK);
-    return scene;
-}
-
-/* An answer without the objects that are there to hide: their numbers are the high ones. */
-static uint32_t *tested_ones(const umb_visible_set *seen, uint32_t objects, uint32_t *count)
-{
-    uint32_t *ids = malloc(((size_t)seen->count + 1) * sizeof *ids);
-    assert_non_null(ids);
-    *count = 0;
-    for (uint32_t k = 0; k < seen->count; ++k) {
-        if (seen->objects[k] < objects) {
-            ids[(*count)++] = seen->objects[k];
-        }
-    }
-    return ids;
-}
 
 typedef struct planted {
     umb_scene *scene;
@@ -105,7 +27,9 @@ static void answer_view(planted *p, const umb_view *view, uint32_t objects, stri
     umb_visible_set seen;
     assert_int_equal(umb_cull(p->culler, view, &seen), UMB_OK);
     free(p->ids);
-    out->ids = p->ids = tested_ones(&seen, objects, &out->count);
+    out->ids = p->ids = malloc(((size_t)seen.count + 1) * sizeof *p->ids);
+    assert_non_null(p->ids);
+    out->count = planted_answer(&seen, objects, p->ids);
 }
 
 /* Look at the views with each mistake; sums has one count for each. */
@@ -115,6 +39,7 @@ static void look(const model *m, truth *oracle, const umb_view *views, uint32_t 
     planted all[PLANT_COUNT] = {{0}};
     for (int p = 0; p < PLANT_COUNT; ++p) {
         all[p].scene = planted_scene(m, (plant)p, weld);
+        assert_non_null(all[p].scene);
         assert_int_equal(umb_index_create(all[p].scene, NULL, &all[p].index), UMB_OK);
         assert_int_equal(umb_culler_create(all[p].index, NULL, &all[p].culler), UMB_OK);
     }
@@ -140,7 +65,7 @@ static void judge(const char *name, const strict_count *sums)
 {
     for (int p = 0; p < PLANT_COUNT; ++p) {
         printf("# %s, %s: views %llu reported %llu wrongly hidden %llu unconfirmed %llu\n", name,
-               PLANT_NAMES[p], (unsigned long long)sums[p].views,
+               plant_name((plant)p), (unsigned long long)sums[p].views,
                (unsigned long long)sums[p].reported, (unsigned long long)sums[p].wrongly_hidden,
                (unsigned long long)sums[p].unconfirmed);
     }

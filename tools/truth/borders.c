@@ -75,12 +75,8 @@ static uint32_t *weld(const model_mesh *mesh)
     return same;
 }
 
-const uint32_t *oracle_neighbours(truth *t, uint32_t number)
+static uint32_t *find_neighbours(const model_mesh *mesh)
 {
-    const model_mesh *mesh = &t->model->meshes[number];
-    if (t->neighbours[number]) {
-        return t->neighbours[number];
-    }
     size_t count = 3 * (size_t)mesh->triangle_count;
     uint32_t *same = weld(mesh);
     half_edge *edges = malloc((count + 1) * sizeof(*edges));
@@ -110,7 +106,17 @@ const uint32_t *oracle_neighbours(truth *t, uint32_t number)
     }
     free(same);
     free(edges);
-    t->neighbours[number] = out;
+    return out;
+}
+
+const uint32_t *oracle_neighbours(truth *t, uint32_t mesh)
+{
+    pthread_mutex_lock(&t->making_neighbours);
+    if (!t->neighbours[mesh]) {
+        t->neighbours[mesh] = find_neighbours(&t->model->meshes[mesh]);
+    }
+    const uint32_t *out = t->neighbours[mesh];
+    pthread_mutex_unlock(&t->making_neighbours);
     return out;
 }
 

@@ -3,6 +3,7 @@
 #define ORACLE_H
 
 #include <embree3/rtcore.h>
+#include <pthread.h>
 
 #include "truth.h"
 
@@ -44,7 +45,8 @@ struct truth {
     oracle_part (*mesh_parts)[PART_KINDS]; /* instanced: per mesh */
     RTCScene *mesh_scenes;
     uint32_t **neighbours; /* per mesh, three per triangle, made when first needed */
-    oracle_chunk *chunks;  /* in the order of the tree's leaves */
+    pthread_mutex_t making_neighbours;
+    oracle_chunk *chunks; /* in the order of the tree's leaves */
     uint32_t chunk_count;
     oracle_box_node *box_nodes;
 };
@@ -62,7 +64,8 @@ truth *oracle_create(const model *m, oracle_form form, umb_error *error);
 void oracle_triangle(const truth *t, uint32_t object, uint32_t triangle, float v[3][3]);
 uint8_t oracle_flags(const truth *t, uint32_t object, uint32_t triangle);
 /* A mesh's neighbours across its edges (corner i to i + 1), found by equal positions; MODEL_NONE
- * where there is no single one. NULL when memory is short. Not safe from two threads at once. */
+ * where there is no single one. NULL when memory is short. Whoever called it for a mesh may read
+ * t->neighbours of it. */
 const uint32_t *oracle_neighbours(truth *t, uint32_t mesh);
 
 /* The tree over chunks (boxes.c). */

@@ -27,7 +27,9 @@ static void grid_item(worker *w, uint64_t row)
 {
     search *s = w->s;
     for (uint32_t x = 0; x < s->grid_width; ++x) {
-        s->grid[row * s->grid_width + x] = cast_picture(w, x + 0.5, (double)row + 0.5);
+        size_t cell = row * s->grid_width + x;
+        s->grid[cell] = cast_picture(w, x + 0.5, (double)row + 0.5);
+        s->grid_depth[cell] = (float)w->trace.culling.depth;
     }
 }
 
@@ -201,7 +203,7 @@ static void target_item(worker *w, uint64_t item)
     if (missing == 0) {
         return;
     }
-    if (s->round == 1) {
+    if (s->round == 1 || s->options->most_targets) {
         aim_at_extremes(w, object, missing);
     }
     aim_at_triangles(w, object, missing);
@@ -214,10 +216,16 @@ static void choose_targets(search *s)
     const model *m = s->t->model;
     s->target_count = 0;
     for (uint32_t i = 0; i < m->object_count; ++i) {
+        if (!s->in_view[i] || (s->options->most_targets && !s->options->accused[i])) {
+            continue;
+        }
         uint8_t known = search_known(s, i);
-        if (s->in_view[i] && (known == 0 || (known != 3 && s->round <= 2))) {
+        if ((known == 0 || (known != 3 && s->round <= 2))) {
             s->targets[s->target_count++] = i;
         }
+    }
+    if (s->options->most_targets) {
+        search_choose_nearest(s);
     }
 }
 
@@ -280,6 +288,9 @@ static void verify(search *s)
 {
     s->target_count = 0;
     for (uint32_t i = 0; i < s->t->model->object_count; ++i) {
+        if (!s->in_view[i]) {
+            continue;
+        }
         const find *a = &s->finds[0][i], *b = &s->finds[1][i];
         if ((a->ray != NO_RAY && !a->verified) || (b->ray != NO_RAY && !b->verified)) {
             s->targets[s->target_count++] = i;
@@ -326,15 +337,13 @@ static bool search_make(search *s)
     s->known = calloc((size_t)(triangles / 64 + 1), sizeof(*s->known));
     s->grid = calloc((size_t)s->grid_width * s->grid_height, sizeof(*s->grid));
     s->workers = calloc(s->worker_count, sizeof(*s->workers));
-    bool ok = s->in_view && s->targets && s->known && s->grid && s->workers;
+    s->grid_depth = calloc((size_t)s->grid_width * s->grid_height, sizeof(*s->grid_depth));
+    bool ok = s->in_view && s->targets && s->known && s->grid && s->grid_depth && s->workers;
     for (int r = 0; r < 2; ++r) {
         s->finds[r] = calloc(objects + 1, sizeof(*s->finds[r]));
         s->proven[r] = calloc(objects + 1, sizeof(*s->proven[r]));
         s->leaks[r] = calloc(objects + 1, sizeof(*s->leaks[r]));
         ok = ok && s->finds[r] && s->proven[r] && s->leaks[r];
-        for (size_t i = 0; ok && i < objects; ++i) {
-            s->finds[r][i].ray = s->leaks[r][i].ray = NO_RAY;
-        }
     }
     for (uint32_t i = 0; ok && i < s->worker_count; ++i) {
         s->workers[i].s = s;
@@ -369,6 +378,7 @@ static void search_free(search *s)
     free(s->fresh);
     free(s->border);
     free(s->grid);
+    free(s->grid_depth);
 }
 
 /* Proven witnesses; for accused objects that have none for either renderer, the unproven ones. */
@@ -378,6 +388,10 @@ static void fill_witnesses(const search *s, truth_result *out)
     uint32_t *counts[2] = {&out->visible_culling, &out->visible_two_sided};
     const uint8_t *accused = s->options->accused;
     for (uint32_t i = 0; i < s->t->model->object_count; ++i) {
+        if (!s->in_view[i]) {
+            continue;
+        }
+        ++out->in_view;
         bool seen = search_known(s, i) != 0, leaked = false;
         out->visible += seen;
         for (int r = 0; r < 2; ++r) {

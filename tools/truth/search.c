@@ -64,7 +64,8 @@ static void note(worker *w, const oracle_sight *sight, const oracle_hit *hit, ui
 {
     double p[3];
     const oracle_view *v = &w->s->view;
-    if (hit->object == MODEL_NONE || renderers == 0 || hit->depth < 0.0) {
+    if (hit->object == MODEL_NONE || renderers == 0 || hit->depth < 0.0 ||
+        !w->s->in_view[hit->object]) {
         return;
     }
     oracle_sight_at(sight, hit->depth, p);
@@ -257,7 +258,8 @@ static void merge(search *s)
             w->reported[e->object] = 0;
             for (int r = 0; r < 2; ++r) {
                 find *f = &s->finds[r][e->object];
-                if ((e->what.renderers & 1u << r) == 0 || f->ray <= e->what.ray) {
+                if ((e->what.renderers & 1u << r) == 0 ||
+                    (f->ray != NO_RAY && f->ray <= e->what.ray)) {
                     continue;
                 }
                 uint8_t refuted = f->refuted;

@@ -10,7 +10,7 @@
 
 #include "oracle.h"
 
-#define NO_RAY UINT64_MAX
+#define NO_RAY 0 /* phases count from 1 */
 /* Set in the numbers of rays along edges: any other find of the block is preferred. */
 #define RAY_ALONG_EDGE ((uint64_t)1 << 63)
 
@@ -59,7 +59,8 @@ typedef struct search {
     size_t border_capacity;
     uint32_t *targets; /* objects that the running phase aims at */
     uint32_t target_count;
-    uint32_t *grid; /* object seen through each grid cell, both sides shown */
+    uint32_t *grid;    /* object seen through each grid cell, both sides shown */
+    float *grid_depth; /* view depth beyond near up to which either renderer sees there */
     uint32_t grid_width, grid_height;
     truth_witness *proven[2]; /* per object: verified finds */
     find *leaks[2];           /* per object: the first refuted find, or NO_RAY */
@@ -84,6 +85,9 @@ bool search_cast(worker *w, const double through[3]);
 uint8_t search_aim(worker *w, const double through[3], uint32_t object, uint32_t triangle);
 /* Renderers for which the object had been seen when the running block began. */
 uint8_t search_known(const search *s, uint32_t object);
+
+/* Leave of the targets at most options->most_targets, those nearest to being seen (nearness.c). */
+void search_choose_nearest(search *s);
 
 /* Rays just outside the silhouette edges of a newly seen triangle (borders.c). */
 void border_item(worker *w, uint64_t item);

@@ -305,6 +305,7 @@ truth *oracle_create(const model *m, oracle_form form, umb_error *error)
     truth *t = calloc(1, sizeof(*t));
     if (t) {
         t->model = m;
+        pthread_mutex_init(&t->making_neighbours, NULL);
     }
     if (t && prepare(t, form) && (t->flat ? build_flat(t) : build_instances(t)) &&
         oracle_boxes_build(t)) {
@@ -356,5 +357,6 @@ void truth_destroy(truth *t)
     free(t->first_vertex);
     free(t->first_triangle);
     free(t->mirrored);
+    pthread_mutex_destroy(&t->making_neighbours);
     free(t);
 }

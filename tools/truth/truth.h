@@ -32,6 +32,11 @@ typedef struct truth_options {
     /* Per object: 1 if a method hid it. Lines to it that exact arithmetic refutes are told too,
      * unconfirmed. What is searched does not depend on it. NULL: none. */
     const uint8_t *accused;
+    /* For long runs over large scenes, whose only question is whether a method was wrong. 0: every
+     * object in view that is not seen is aimed at. Else at most so many in a round: accused ones,
+     * first those that the grid's depths leave room for in the picture, then those with room one
+     * cell beside them, and an eighth anywhere. */
+    uint32_t most_targets;
     uint32_t threads; /* 0: 1 */
 } truth_options;
 
@@ -39,6 +44,7 @@ typedef struct truth_result {
     truth_witness *culling;   /* per object */
     truth_witness *two_sided; /* per object */
     uint64_t rays;
+    uint32_t in_view;     /* objects with triangles whose box no plane of the view keeps out */
     uint32_t visible;     /* objects with a confirmed witness for either renderer */
     uint32_t unconfirmed; /* accused objects with an unconfirmed one only */
     uint32_t visible_culling, visible_two_sided;
@@ -50,8 +56,7 @@ typedef struct truth_result {
 truth *truth_create(const model *m, umb_error *error);
 void truth_destroy(truth *t);
 
-/* Answer a view. *out is allocated; free with truth_result_free. One call at a time on one
- * oracle. */
+/* Answer a view. *out is allocated; free with truth_result_free. Any number of calls at once. */
 bool truth_view(truth *t, const umb_view *view, const truth_options *options, truth_result *out,
                 umb_error *error);
 void truth_result_free(truth_result *r);

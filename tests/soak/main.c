@@ -1,0 +1,273 @@
+/* soak: zero wrongly hidden, over many views.
+ *
+ *   soak [--short] [--out FOLDER] [--threads N] [--scale X] [--only TEXT] [--views N]
+ *        [--plant 1|2] [--part NAME --view K]
+ *
+ * Prints the table of docs/results/soak.md. What is done is kept in FOLDER (out/soak), a file for
+ * each part of the plan, and taken up by the next run of the same program over the same scenes.
+ * --only: parts whose name or family contains TEXT. --views: of each part no more than N new ones.
+ * --plant: cull a scene with a planted mistake (1: objects too small, 2: occluders too large),
+ * which must be found. --part --view: one view alone, told in full.
+ *
+ * Exit codes: 0 nothing wrongly hidden; 1 something was; 2 wrong usage; 3 something cannot be read or
+ * written; 4 interrupted or stopped by --views, what is done is saved. */
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <xxhash.h>
+
+#include "io/input.h"
+#include "soak.h"
+
+enum { DONE = 0, WRONG = 1, USAGE = 2, INPUT = 3, STOPPED = 4 };
+
+typedef struct settings {
+    bool full;
+    const char *out, *only, *part;
+    uint32_t threads, most_batches;
+    double scale;
+    plant planted;
+    uint64_t view;
+} settings;
+
+static volatile sig_atomic_t stop;
+
+static void on_signal(int number)
+{
+    (void)number;
+    stop = 1;
+}
+
+static bool read_settings(int count, char **words, settings *s)
+{
+    *s = (settings){.full = true,
+                    .out = "out/soak",
+                    .only = "",
+                    .threads = 2,
+                    .most_batches = UINT32_MAX,
+                    .scale = 1.0};
+    for (int i = 1; i < count; ++i) {
+        const char *word = words[i], *value = i + 1 < count ? words[i + 1] : NULL;
+        if (strcmp(word, "--short") == 0) {
+            s->full = false;
+            continue;
+        }
+        if (value == NULL) {
+            return false;
+        }
+        ++i;
+        if (strcmp(word, "--out") == 0) {
+            s->out = value;
+        } else if (strcmp(word, "--only") == 0) {
+            s->only = value;
+        } else if (strcmp(word, "--part") == 0) {
+            s->part = value;
+        } else if (strcmp(word, "--view") == 0) {
+            s->view = strtoull(value, NULL, 10);
+        } else if (strcmp(word, "--threads") == 0) {
+            s->threads = (uint32_t)strtoul(value, NULL, 10);
+        } else if (strcmp(word, "--views") == 0) {
+            s->most_batches = ((uint32_t)strtoul(value, NULL, 10) + SOAK_BATCH - 1) / SOAK_BATCH;
+        } else if (strcmp(word, "--scale") == 0) {
+            s->scale = strtod(value, NULL);
+        } else if (strcmp(word, "--plant") == 0) {
+            s->planted = (plant)strtoul(value, NULL, 10);
+        } else {
+            return false;
+        }
+    }
+    return s->threads > 0 && s->scale > 0.0 && s->planted < PLANT_COUNT;
+}
+
+/* What an answer depends on: this very program, the scene's bytes, the part's settings. */
+static bool key_of(const soak_part *part, plant planted, uint64_t program, uint64_t *out,
+                   umb_error *error)
+{
+    char text[1024];
+    XXH3_state_t *state = XXH3_createState();
+    if (state == NULL) {
+        return false;
+    }
+    (void)XXH3_64bits_reset(state);
+    (void)snprintf(text, sizeof text, "%016" PRIx64 " %s %d %u %" PRIu64 " %.17g %d %d", program,
+                   part->scene, (int)part->style, part->most_targets, part->rays, part->shift,
+                   part->weld, (int)planted);
+    (void)XXH3_64bits_update(state, text, strlen(text));
+    bool ok = true;
+    if (part->scene[0] == '/' || part->scene[0] == '.') {
+        input bytes;
+        ok = input_read(part->scene, &bytes, error);
+        if (ok) {
+            (void)XXH3_64bits_update(state, bytes.data, bytes.size);
+            input_free(&bytes);
+        }
+    }
+    *out = XXH3_64bits_digest(state);
+    (void)XXH3_freeState(state);
+    return ok;
+}
+
+static bool program_hash(const char *name, uint64_t *out, umb_error *error)
+{
+    input bytes;
+    if (!input_read("/proc/self/exe", &bytes, error) && !input_read(name, &bytes, error)) {
+        return false;
+    }
+    *out = XXH3_64bits(bytes.data, bytes.size);
+    input_free(&bytes);
+    return true;
+}
+
+static void print_row(const char *scene, const char *views, const soak_count *c)
+{
+    double ratio = c->seen != 0 ? (double)c->reported / (double)c->seen : 0.0;
+    printf("| %s | %s | %" PRIu64 " | %" PRIu64 " | %" PRIu64 " | %" PRIu64 " | %.3f | %" PRIu64
+           " | %" PRIu64 " | %.0f | %.3g |\n",
+           scene, views, c->views, c->pairs, c->seen, c->reported, ratio, c->wrong, c->unconfirmed,
+           c->seconds, c->seconds > 0.0 ? (double)c->pairs / c->seconds : 0.0);
+}
+
+static const char *style_name(soak_style style)
+{
+    static const char *const names[] = {"ordinary", "adversarial", "adversarial"};
+    return names[style];
+}
+
+static void print_table(const soak_plan *plan, const soak_count *counts)
+{
+    soak_count all = {0}, outside = {0}, adversarial = {0};
+    puts("| scene | views | | object-view pairs | seen | reported | conservativity | wrongly "
+         "hidden | "
+         "unconfirmed | processor seconds | pairs a second |");
+    puts("|---|---|---|---|---|---|---|---|---|---|---|");
+    for (uint32_t k = 0; k < plan->count; ++k) {
+        const soak_part *part = &plan->parts[k];
+        soak_count_add(&all, &counts[k]);
+        if (strcmp(part->family, "blocks") != 0) {
+            soak_count_add(&outside, &counts[k]);
+        }
+        if (part->style != SOAK_ORDINARY) {
+            soak_count_add(&adversarial, &counts[k]);
+        }
+        if (counts[k].views != 0) {
+            print_row(part->name, style_name(part->style), &counts[k]);
+        }
+    }
+    print_row("**all**", "", &all);
+    print_row("all but blocks", "", &outside);
+    print_row("all adversarial", "", &adversarial);
+}
+
+typedef struct soak_state {
+    const settings *s;
+    soak_scene scene;
+    uint64_t program;
+    char wrong_file[1200];
+    bool unfinished;
+} soak_state;
+
+static bool same_scene(const soak_scene *s, const soak_part *part)
+{
+    return strcmp(s->scene, part->scene) == 0 && s->shift == part->shift && s->weld == part->weld;
+}
+
+static bool all_done(const soak_log *log)
+{
+    for (uint32_t k = 0; k < log->batches; ++k) {
+        if (log->done[k] == 0) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static bool run_part(soak_state *st, const soak_part *part, soak_count *count, umb_error *error)
+{
+    uint64_t key;
+    soak_log log;
+    if (!key_of(part, st->s->planted, st->program, &key, error) ||
+        !soak_log_open(&log, st->s->out, part, key, error)) {
+        return false;
+    }
+    bool ok = true;
+    if (!all_done(&log) && !stop) {
+        if (!same_scene(&st->scene, part)) {
+            (void)fprintf(stderr, "%s: loading %s\n", part->name, part->scene);
+            soak_scene_free(&st->scene);
+            ok = soak_scene_load(part, st->s->planted, &st->scene, error);
+        }
+        soak_run run = {.part = part,
+                        .scene = &st->scene,
+                        .log = &log,
+                        .wrong_file = st->wrong_file,
+                        .threads = st->s->threads,
+                        .most_batches = st->s->most_batches,
+                        .stop = &stop};
+        ok = ok && (st->s->part != NULL ? soak_run_view(&run, st->s->view, error)
+                                        : soak_run_part(&run, error));
+    }
+    st->unfinished = st->unfinished || !all_done(&log);
+    *count = log.sum;
+    soak_log_close(&log);
+    return ok;
+}
+
+static bool wanted(const settings *s, const soak_part *part)
+{
+    if (s->part != NULL) {
+        return strcmp(s->part, part->name) == 0;
+    }
+    return strstr(part->name, s->only) != NULL || strstr(part->family, s->only) != NULL;
+}
+
+static int run_plan(const settings *s, const soak_plan *plan, const char *program)
+{
+    umb_error error = {0};
+    soak_state st = {.s = s};
+    soak_count *counts = calloc((size_t)plan->count + 1, sizeof *counts);
+    bool ok = counts != NULL && program_hash(program, &st.program, &error);
+    (void)snprintf(st.wrong_file, sizeof st.wrong_file, "%.1000s/wrong.txt", s->out);
+    for (uint32_t k = 0; ok && k < plan->count; ++k) {
+        if (wanted(s, &plan->parts[k])) {
+            ok = run_part(&st, &plan->parts[k], &counts[k], &error);
+        }
+    }
+    soak_scene_free(&st.scene);
+    uint64_t wrong = 0;
+    for (uint32_t k = 0; ok && k < plan->count; ++k) {
+        wrong += counts[k].wrong;
+    }
+    if (ok && s->part == NULL) {
+        print_table(plan, counts);
+    }
+    free(counts);
+    if (!ok) {
+        (void)fprintf(stderr, "soak: %s\n", error.text);
+        return INPUT;
+    }
+    return wrong != 0 ? WRONG : st.unfinished && s->part == NULL ? STOPPED : DONE;
+}
+
+int main(int count, char **words)
+{
+    settings s;
+    soak_plan plan;
+    umb_error error = {0};
+    if (!read_settings(count, words, &s)) {
+        (void)fprintf(stderr, "soak: what is asked for is no option, or lacks a value: "
+                              "see the head of tests/soak/main.c\n");
+        return USAGE;
+    }
+    (void)mkdir(s.out, 0777);
+    (void)signal(SIGINT, on_signal);
+    (void)signal(SIGTERM, on_signal);
+    if (!soak_plan_make(s.full, s.scale, &plan, &error)) {
+        (void)fprintf(stderr, "soak: %s\n", error.text);
+        return INPUT;
+    }
+    int code = run_plan(&s, &plan, words[0]);
+    soak_plan_free(&plan);
+    return code;
+}

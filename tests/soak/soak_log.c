@@ -1,0 +1,86 @@
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "soak.h"
+
+void soak_count_add(soak_count *sum, const soak_count *c)
+{
+    sum->views += c->views;
+    sum->pairs += c->pairs;
+    sum->seen += c->seen;
+    sum->reported += c->reported;
+    sum->wrong += c->wrong;
+    sum->unconfirmed += c->unconfirmed;
+    sum->rays += c->rays;
+    sum->seconds += c->seconds;
+}
+
+/* Lines that were cut off by an interruption count for nothing. */
+static void take_up(soak_log *log, FILE *f)
+{
+    char line[512];
+    while (fgets(line, sizeof line, f) != NULL) {
+        uint32_t batch;
+        int end = 0;
+        soak_count c;
+        int fields = sscanf(line,
+                            "batch %" SCNu32 " views %" SCNu64 " pairs %" SCNu64 " seen %" SCNu64
+                            " reported %" SCNu64 " wrong %" SCNu64 " unconfirmed %" SCNu64
+                            " rays %" SCNu64 " seconds %lf .%n",
+                            &batch, &c.views, &c.pairs, &c.seen, &c.reported, &c.wrong,
+                            &c.unconfirmed, &c.rays, &c.seconds, &end);
+        if (fields == 9 && end > 0 && batch < log->batches && log->done[batch] == 0) {
+            log->done[batch] = 1;
+            soak_count_add(&log->sum, &c);
+        }
+    }
+}
+
+bool soak_log_open(soak_log *log, const char *folder, const soak_part *part, uint64_t key,
+                   umb_error *error)
+{
+    memset(log, 0, sizeof *log);
+    log->batches = (part->views + SOAK_BATCH - 1) / SOAK_BATCH;
+    log->done = calloc((size_t)log->batches + 1, 1);
+    (void)snprintf(log->file, sizeof log->file, "%.1000s/%s-%016" PRIx64 ".log", folder, part->name,
+                   key);
+    FILE *f = fopen(log->file, "a+");
+    if (f == NULL || log->done == NULL) {
+        error->code = UMB_ERROR_ARGUMENT;
+        (void)snprintf(error->text, sizeof error->text,
+                       "%.180s: cannot be written; choose another folder with --out", log->file);
+        if (f != NULL) {
+            (void)fclose(f);
+        }
+        soak_log_close(log);
+        return false;
+    }
+    rewind(f);
+    take_up(log, f);
+    (void)fclose(f);
+    return true;
+}
+
+bool soak_log_add(soak_log *log, uint32_t batch, const soak_count *c)
+{
+    FILE *f = fopen(log->file, "a");
+    bool ok = f != NULL;
+    ok = ok && fprintf(f,
+                       "\nbatch %" PRIu32 " views %" PRIu64 " pairs %" PRIu64 " seen %" PRIu64
+                       " reported %" PRIu64 " wrong %" PRIu64 " unconfirmed %" PRIu64
+                       " rays %" PRIu64 " seconds %.3f .\n",
+                       batch, c->views, c->pairs, c->seen, c->reported, c->wrong, c->unconfirmed,
+                       c->rays, c->seconds) > 0;
+    ok = (f == NULL || fclose(f) == 0) && ok;
+    log->done[batch] = 1;
+    soak_count_add(&log->sum, c);
+    return ok;
+}
+
+void soak_log_close(soak_log *log)
+{
+    free(log->done);
+    log->done = NULL;
+}
