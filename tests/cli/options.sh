@@ -46,3 +46,24 @@ same "a path without header" spaced bare
 same "--seed and seed=" seed_key seed_option
 ask --eye 0,0,-50 --target 0,0,0 --ortho 40 --near -10 --far 90 | jq -c '[.class,.in_frustum > 0]'
 ask --eye -30,1.7,-4 --target 20,1.7,-3 --min-pixels 30 | jq -c '[.class,.stats.small > 0]'
+
+# Views of lights. A spot's cone lies in the square that a camera of the same angle shows, and reaches from
+# --near to --far; a cube's face is a camera of 90 degrees; planes cut.
+where="--eye -30,1.7,-4 --target 20,1.7,-3"
+held() {
+    ask --method none "$@" | jq -c '.ids[]' | sort
+}
+held $where --fov 100 --size 512x512 --far 80 >square
+held $where --spot 100 --far 80 >spot
+echo "a spot's cone and the square around it: $(comm -13 square spot | wc -l) more, $(wc -l <spot) of $(wc -l <square)"
+held --eye 3,1.7,4 --cube -z --far 80 >face
+held --eye 3,1.7,4 --target 3,1.7,-6 --fov 90 --size 512x512 --far 80 >camera
+same "a cube's face and a camera of 90 degrees" face camera
+held $where >whole
+held $where --plane 0,0,1,4 --plane=1,0,0,10 >cut
+echo "planes: $(comm -13 whole cut | wc -l) more, $(wc -l <cut) of $(wc -l <whole)"
+held $where --sun -3,-1,0.5 --slice 1,30 >cascade
+held $where --sun -3,-1,0.5 --slice 1,30 --reach 1000 >far
+held $where --sun -3,-1,0.5 --slice 1,30 --reach 2 >short
+same "the sun reaches as far as the scene" cascade far
+echo "a short reach: $(comm -13 cascade short | wc -l) more, $(wc -l <short) of $(wc -l <cascade)"

@@ -33,6 +33,24 @@ run cull $scene $view --fov -60
 run cull $scene $view --ortho 0
 run cull $scene $view --ortho 5 --fov 60
 run cull $scene $view --ortho 5 --far inf
+run cull $scene $view --spot 180
+run cull $scene $view --spot 50 --fov 60
+run cull $scene $view --spot 50 --far inf
+run cull $scene --eye 1,2,3 --spot 50
+run cull $scene $view --cube x
+run cull $scene $view --cube +x --sun 1,2,3
+run cull $scene --eye 1,2,3 --cube +x --near 0
+run cull $scene $view --sun 0,0,0
+run cull $scene $view --sun 0,-1,0 --far inf
+run cull $scene $view --sun 0,-1,0 --slice 9,9
+run cull $scene $view --sun 0,-1,0 --slice 9000,9900
+run cull $scene $view --sun 0,-1,0 --reach -1
+run cull $scene $view --slice 1,9
+run cull $scene $view --reach 5
+run cull $scene $view --plane 0,0,0,1
+run cull $scene $view --plane 1,2,3
+run cull $scene $view $(printf -- '--plane 1,0,0,%s ' 1 2 3 4 5 6 7 8 9 10 11)
+run cull $scene $view --spot 50 $(printf -- '--plane 1,0,0,%s ' 1 2 3 4 5 6 7)
 run cull $scene $view --size 0x512
 run cull $scene $view --size 1024
 run cull $scene $view --size 1024x

@@ -39,15 +39,21 @@ static const char *number(const char *text, double *out)
     return read_number(text, &end, out) && *end == '\0' ? NULL : "a number";
 }
 
-static const char *point(const char *text, double out[3])
+/* Numbers with commas between them. */
+static bool numbers(const char *text, int how_many, double *out)
 {
-    for (int i = 0; i < 3; ++i) {
-        if (!read_number(text, &text, &out[i]) || *text != (i < 2 ? ',' : '\0')) {
-            return "three numbers X,Y,Z";
+    for (int i = 0; i < how_many; ++i) {
+        if (!read_number(text, &text, &out[i]) || *text != (i < how_many - 1 ? ',' : '\0')) {
+            return false;
         }
         ++text;
     }
-    return NULL;
+    return true;
+}
+
+static const char *point(const char *text, double out[3])
+{
+    return numbers(text, 3, out) ? NULL : "three numbers X,Y,Z";
 }
 
 /* Digits, perhaps k or M. */
@@ -127,6 +133,57 @@ static const char *read_fov(options *o, const char *text)
 static const char *read_ortho(options *o, const char *text)
 {
     return number(text, &o->ortho_height) || !(o->ortho_height > 0.0) ? "a height above 0" : NULL;
+}
+
+static const char *read_spot(options *o, const char *text)
+{
+    return number(text, &o->spot) || !(o->spot > 0.0 && o->spot < 180.0)
+               ? "degrees between 0 and 180"
+               : NULL;
+}
+
+static const char *read_cube(options *o, const char *text)
+{
+    static const char *const names[] = {"+x", "-x", "+y", "-y", "+z", "-z"};
+    for (int i = 0; i < 6; ++i) {
+        if (strcmp(text, names[i]) == 0) {
+            o->cube = (umb_cube_face)i;
+            return NULL;
+        }
+    }
+    return "one of +x, -x, +y, -y, +z, -z";
+}
+
+static const char *read_sun(options *o, const char *text)
+{
+    return point(text, o->sun) || (o->sun[0] == 0.0 && o->sun[1] == 0.0 && o->sun[2] == 0.0)
+               ? "three numbers X,Y,Z that are not all zero"
+               : NULL;
+}
+
+static const char *read_slice(options *o, const char *text)
+{
+    return numbers(text, 2, o->slice) && o->slice[0] < o->slice[1] ? NULL
+                                                                   : "two depths A,B, A below B";
+}
+
+static const char *read_reach(options *o, const char *text)
+{
+    return number(text, &o->reach) || !(o->reach >= 0.0) ? "a distance from 0" : NULL;
+}
+
+/* Each one given is another plane. */
+static const char *read_plane(options *o, const char *text)
+{
+    if (o->plane_count == UMB_MAX_CLIP_PLANES) {
+        return "no more than 10 planes";
+    }
+    double *p = o->planes[o->plane_count];
+    if (!numbers(text, 4, p) || (p[0] == 0.0 && p[1] == 0.0 && p[2] == 0.0)) {
+        return "four numbers A,B,C,D, the first three not all zero";
+    }
+    o->plane_count++;
+    return NULL;
 }
 
 static const char *read_size(options *o, const char *text)
@@ -332,6 +389,13 @@ static const option_spec specs[] = {
     {"up", 0, VIEWS, "DIR", read_up, "up: x, y, z or X,Y,Z (default: as info says)"},
     {"fov", 0, VIEWS, "DEG", read_fov, "vertical field of view (default 60)"},
     {"ortho", 0, VIEWS, "HEIGHT", read_ortho, "parallel lines; height of the view instead of --fov"},
+    {"spot", 0, VIEWS, "DEG", read_spot, "a spot light's cone, DEG wide, --far long"},
+    {"cube", 0, VIEWS, "FACE", read_cube, "a cube map's face at the eye: +x, -x, +y, -y, +z, -z"},
+    {"sun", 0, VIEWS, "X,Y,Z", read_sun, "the sun's view, light going X,Y,Z, of what the view shows"},
+    {"slice", 0, VIEWS, "A,B", read_slice, "--sun: only what lies at depths A to B of the view"},
+    {"reach", 0, VIEWS, "D", read_reach, "--sun: how far towards it casters are (default: all)"},
+    {"plane", 0, VIEWS, "A,B,C,D", read_plane,
+     "cut by Ax + By + Cz + D >= 0; may be given ten times"},
     {"size", 0, VIEWS, "WxH", read_size, "the picture, square pixels (default 1024x512)"},
     {"near", 0, VIEWS, "D", read_near, "depth of the near plane (default 0.1)"},
     {"far", 0, VIEWS, "D|inf", read_far,

@@ -3,6 +3,7 @@
 #define OPTIONS_H
 
 #include "io/model.h"
+#include "umbrage/light.h"
 
 /* Exit codes (docs/umbrage.1). */
 enum {
@@ -35,6 +36,10 @@ typedef struct options {
 
     double eye[3], target[3], up[3];
     double fov, ortho_height, near_depth, far_depth, min_pixels;
+    double spot, sun[3], slice[2], reach; /* degrees; direction; depths; towards the light */
+    umb_cube_face cube;
+    double planes[UMB_MAX_CLIP_PLANES][4]; /* in the file's coordinates */
+    uint32_t plane_count;
     uint32_t width, height, buffer_width, buffer_height;
     uint32_t row, from, to, every;
 

@@ -1,6 +1,5 @@
 #include "setup.h"
 
-#include <float.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -128,89 +127,16 @@ void setup_to_file(const model *m, const double in[3], double out[3])
 
 /* ---- views ---------------------------------------------------------------------------------- */
 
-/* Nothing of the scene lies deeper than the distance to the farthest corner of its box. Three exact
- * or once-rounded differences, squares, two sums, a root, and the rounding of forward to unit
- * length: under 12 roundings of DBL_EPSILON / 2 each, so 16 epsilons keep the corner itself in
- * view. */
-static double farthest_corner(const model *m, const double eye[3], double near_depth)
-{
-    double square = 0.0;
-    for (int i = 0; i < 3; ++i) {
-        double reach = fmax(fabs((double)m->bounds.min[i] - eye[i]),
-                            fabs((double)m->bounds.max[i] - eye[i]));
-        square += reach * reach;
-    }
-    double distance = sqrt(square) * (1.0 + 16.0 * DBL_EPSILON);
-    return distance > near_depth ? distance : near_depth + 1.0;
-}
-
-static umb_result make_view(const setup *s, const options *o, const double row[6], umb_view *out)
-{
-    const model *m = s->model;
-    double eye[3], target[3];
-    for (int i = 0; i < 3; ++i) {
-        eye[i] = row[i] - m->origin[i];
-        target[i] = row[i + 3] - m->origin[i];
-    }
-    const double *up = options_given(o, "up") ? o->up : m->up;
-    double aspect = (double)o->width / o->height;
-    double far_depth = options_given(o, "far") ? o->far_depth
-                                               : farthest_corner(m, eye, o->near_depth);
-    umb_result result = options_given(o, "ortho")
-                            ? umb_view_look_at_ortho(out, eye, target, up, o->ortho_height, aspect,
-                                                     o->near_depth, far_depth)
-                            : umb_view_look_at(out, eye, target, up,
-                                               o->fov * (3.14159265358979323846 / 180.0), aspect,
-                                               o->near_depth, far_depth);
-    if (result == UMB_OK) {
-        out->width = o->width;
-        out->height = o->height;
-        out->buffer_width = o->buffer_width;
-        out->buffer_height = o->buffer_height;
-        out->min_pixels = o->min_pixels;
-        result = umb_view_check(out, NULL);
-    }
-    return result;
-}
-
-/* In the order in which people get them wrong. */
-static const char *why_impossible(const setup *s, const options *o, const double row[6])
-{
-    bool finite = true, same = true;
-    double eye[3];
-    for (int i = 0; i < 3; ++i) {
-        eye[i] = row[i] - s->model->origin[i];
-        finite = finite && fabs(row[i]) <= 1e30 && fabs(row[i + 3]) <= 1e30;
-        same = same && eye[i] == row[i + 3] - s->model->origin[i];
-    }
-    if (!finite) {
-        return "coordinates must be finite, at most 1e30";
-    }
-    if (same) {
-        return "eye and target are the same point";
-    }
-    bool ortho = options_given(o, "ortho");
-    if (!ortho && !(o->near_depth > 0.0)) {
-        return "--near must be above 0 (below only with --ortho)";
-    }
-    if (ortho && isinf(o->far_depth)) {
-        return "--far inf needs perspective";
-    }
-    if (options_given(o, "far") && !(o->far_depth > o->near_depth)) {
-        return "--far must be above --near";
-    }
-    return "numbers too large, too small or too far apart (fov, height, size, near, far)";
-}
-
 static int check_views(const setup *s, const options *o, const views *v)
 {
     umb_view view;
+    umb_error why_not;
     for (uint32_t k = 0; k < v->count; ++k) {
         uint32_t r = setup_row(v, k);
-        if (make_view(s, o, v->path.rows[r], &view) == UMB_OK) {
+        const char *why = setup_make_view(s->model, o, v->path.rows[r], &view, &why_not);
+        if (!why) {
             continue;
         }
-        const char *why = why_impossible(s, o, v->path.rows[r]);
         return v->is_path ? fail(o, EXIT_USAGE, "impossible view: row %u of %s: %s", r, o->path, why)
                           : fail(o, EXIT_USAGE, "impossible view: %s", why);
     }
@@ -248,7 +174,8 @@ static int choose_rows(const options *o, bool single, views *out)
 
 static int single_row(const options *o, views *out)
 {
-    if (!options_given(o, "eye") || !options_given(o, "target")) {
+    bool aimed = options_given(o, "target") || options_given(o, "cube");
+    if (!options_given(o, "eye") || !aimed) {
         return fail(o, EXIT_USAGE, "needs a view: --eye X,Y,Z --target X,Y,Z, or --path FILE");
     }
     out->path.rows = malloc(sizeof *out->path.rows);
@@ -268,8 +195,17 @@ static int check_choices(const options *o)
     if (o->path && eye) {
         return fail(o, EXIT_USAGE, "takes --eye and --target, or --path, not both");
     }
-    if (options_given(o, "fov") && options_given(o, "ortho")) {
-        return fail(o, EXIT_USAGE, "takes --fov or --ortho, not both");
+    static const char *const shapes[][2] = {{"fov", "ortho"},  {"fov", "spot"},   {"fov", "cube"},
+                                            {"ortho", "spot"}, {"ortho", "cube"}, {"spot", "cube"},
+                                            {"spot", "sun"},   {"cube", "sun"}};
+    for (size_t i = 0; i < sizeof shapes / sizeof shapes[0]; ++i) {
+        if (options_given(o, shapes[i][0]) && options_given(o, shapes[i][1])) {
+            return fail(o, EXIT_USAGE, "takes --%s or --%s, not both", shapes[i][0], shapes[i][1]);
+        }
+    }
+    if (!options_given(o, "sun") && (options_given(o, "slice") || options_given(o, "reach"))) {
+        return fail(o, EXIT_USAGE, "--%s needs --sun",
+                    options_given(o, "slice") ? "slice" : "reach");
     }
     static const char *const row_options[] = {"row", "from", "to", "every"};
     for (int i = 0; i < 4; ++i) {
@@ -310,6 +246,7 @@ uint32_t setup_row(const views *v, uint32_t k)
 umb_view setup_view(const setup *s, const options *o, const views *v, uint32_t k)
 {
     umb_view view;
-    make_view(s, o, v->path.rows[setup_row(v, k)], &view);
+    umb_error error;
+    setup_make_view(s->model, o, v->path.rows[setup_row(v, k)], &view, &error);
     return view;
 }

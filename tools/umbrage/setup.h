@@ -38,6 +38,11 @@ uint32_t setup_row(const views *v, uint32_t k);
 /* View k of the list, in the model's coordinates. */
 umb_view setup_view(const setup *s, const options *o, const views *v, uint32_t k);
 
+/* The view that the options make of a row: eye and target in the file's coordinates. NULL, or what is
+ * wrong with it, perhaps in *error; *out is then of no use. */
+const char *setup_make_view(const model *m, const options *o, const double row[6], umb_view *out,
+                            umb_error *error);
+
 /* A point of the model in the file's coordinates. */
 void setup_to_file(const model *m, const double in[3], double out[3]);
 
