@@ -4,7 +4,7 @@ JOBS ?= $(shell nproc)
 BUILD := env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL cmake --build
 CTEST := ctest -j $(JOBS) --timeout 1800 --output-on-failure --no-tests=error --test-dir
 
-.PHONY: help deps build demo test asan check matrix bench soak fuzz format tidy clean
+.PHONY: help deps build demo test asan check matrix bench results soak fuzz format tidy clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-8s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -40,10 +40,13 @@ matrix: build ## Clang, ThreadSanitizer, scalar-only, -O0, -O3: tests, and equal
 	@scripts/deps build matrix
 	@scripts/matrix
 
-bench: deps ## measure: build/bench
+bench: deps ## measure whole frames beside rivals and exact answers (BENCH=--quick: two minutes)
 	@cmake --preset bench >/dev/null
 	@$(BUILD) build/bench -j $(JOBS)
-	@scripts/bench
+	@scripts/bench $(BENCH)
+
+results: deps ## docs/results/compare.md and its plots, by a full bench
+	@$(MAKE) --no-print-directory bench BENCH=--docs
 
 soak: build ## the long run: a thousand million object-view pairs against the oracle
 	@scripts/soak

@@ -44,7 +44,7 @@ list(APPEND UMB_INSIDE umbrage_inside)
 include(cmake/tests.cmake)
 
 # bench/yardstick_ISA.c has its instruction set's flags, as the core's kernels have; bench/bench_NAME.c
-# is one program.
+# is one program, bench/compare/ another. Its rivals get what makes them fast, loose floats included.
 if(UMB_BENCH)
   add_library(umb_yardstick STATIC bench/yardstick.c bench/yardstick_avx2.c)
   if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64)$")
@@ -58,4 +58,16 @@ if(UMB_BENCH)
     target_link_libraries(${name} PRIVATE umb_yardstick ${UMB_INSIDE} PkgConfig::JANSSON m)
     set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bench)
   endforeach()
+  file(GLOB UMB_COMPARE_SOURCES CONFIGURE_DEPENDS bench/compare/*.c)
+  set(UMB_RIVAL_FLAGS -O3 -fno-trapping-math -fno-signed-zeros -ffinite-math-only)
+  if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64)$")
+    list(APPEND UMB_RIVAL_FLAGS -mavx2 -mfma)
+  endif()
+  set_source_files_properties(bench/compare/screen_boxes.c bench/compare/zbuffer.c
+                              bench/compare/ray_buffer.c PROPERTIES COMPILE_OPTIONS "${UMB_RIVAL_FLAGS}")
+  add_executable(compare ${UMB_COMPARE_SOURCES})
+  target_include_directories(compare PRIVATE src tools bench)
+  target_link_libraries(compare PRIVATE umb_yardstick ${UMB_INSIDE} PkgConfig::JANSSON PkgConfig::XXHASH
+                        ${EMBREE_LIBRARY} m)
+  set_target_properties(compare PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bench)
 endif()

@@ -1,0 +1,21 @@
+/* A rival: the plain z-buffer. Occluders front to back, one triangle at a time, sampled at pixel centres;
+ * then each box by its rectangle and nearest depth. No bound of rounding, no care for what lies between
+ * samples. */
+#ifndef ZBUFFER_H
+#define ZBUFFER_H
+
+#include "screen_boxes.h"
+
+typedef struct zbuffer zbuffer;
+
+zbuffer *zbuffer_create(const world *w, uint32_t width, uint32_t height);
+void zbuffer_destroy(zbuffer *z);
+
+/* A whole frame: clear, frustum, sort, draw what is not hidden yet, test every box. Objects' ids, valid
+ * until the next frame. */
+uint32_t zbuffer_frame(zbuffer *z, const umb_view *view, const uint32_t **objects);
+
+/* Of the last frame. */
+uint32_t zbuffer_drawn(const zbuffer *z);
+
+#endif
