@@ -333,10 +333,11 @@ static void test_world_bounds(void **state)
                 t.m[k / 4][k % 4] = ((float)dice_roll(&d, 2001) - 1000.0f) / 37.0f;
             }
         }
-        umb_mesh_place place = umb_mesh_world_bounds(m, &t);
+        umb_mesh_place place;
+        const umb_aabb *block_bounds = umb_mesh_world_bounds(m, &t, &place);
         for (int blocking = 0; blocking < 2; ++blocking) {
             uint32_t count = blocking ? m->block_position_count : m->position_count;
-            umb_aabb box = blocking ? place.block_bounds : place.bounds;
+            umb_aabb box = blocking ? *block_bounds : place.bounds;
             bool touched[6] = {false};
             for (uint32_t i = 0; i < count; ++i) {
                 float p[3];

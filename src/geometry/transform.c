@@ -2,13 +2,17 @@
 
 #include <string.h>
 
-/* By the bits, in one pass: moving many objects asks for each. Signs of zeros are left out. */
+/* Asked for each object that moves: most have a translation. The rest by the bits, in one pass, but
+ * for the signs of zeros. */
 bool umb_transform_is_identity(const umb_transform *t)
 {
     static const uint32_t one[12] = {0x3F800000u, 0, 0, 0, 0,           0x3F800000u,
                                      0,           0, 0, 0, 0x3F800000u, 0};
     static const uint32_t no_sign = 0x7FFFFFFFu;
     uint32_t bits[12], zero = 0, identity = 0;
+    if (t->m[0][3] != 0.0f || t->m[1][3] != 0.0f || t->m[2][3] != 0.0f) {
+        return false;
+    }
     memcpy(bits, t->m, sizeof bits);
     for (int i = 0; i < 12; ++i) {
         zero |= bits[i] & no_sign;

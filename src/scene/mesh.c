@@ -292,12 +292,15 @@ void umb_mesh_destroy(const umb_allocator *allocator, umb_mesh *mesh)
 /* True if each row looks at one axis at most. */
 static bool keeps_boxes(const umb_transform *t)
 {
-    bool oblique = false;
-    for (int i = 0; i < 3; ++i) {
-        bool x = t->m[i][0] != 0.0f, y = t->m[i][1] != 0.0f, z = t->m[i][2] != 0.0f;
-        oblique |= (x & y) | (y & z) | (z & x);
+    uint32_t bits[12], used[12], oblique = 0;
+    memcpy(bits, t->m, sizeof bits);
+    for (int i = 0; i < 12; ++i) {
+        used[i] = (bits[i] & 0x7FFFFFFFu) != 0;
     }
-    return !oblique;
+    for (int i = 0; i < 12; i += 4) {
+        oblique |= (used[i] & used[i + 1]) | (used[i + 1] & used[i + 2]) | (used[i + 2] & used[i]);
+    }
+    return oblique == 0;
 }
 
 static inline double lower(double a, double b)
@@ -312,63 +315,63 @@ static inline double higher(double a, double b)
 
 /* Box of the images of a box's corners. Rounding keeps order, in every step of the sum: the least
  * of the eight sums is the sum of the least products. */
-static umb_aabb move_corners(const umb_aabb *box, const umb_transform *t)
+static inline void move_corners(const umb_aabb *box, const umb_transform *t, umb_aabb *out)
 {
-    umb_aabb out;
     for (int i = 0; i < 3; ++i) {
-        double low = 0.0, high = 0.0;
-        for (int k = 0; k < 3; ++k) {
-            double a = (double)t->m[i][k] * box->min[k];
-            double b = (double)t->m[i][k] * box->max[k];
-            low += lower(a, b);
-            high += higher(a, b);
-        }
-        out.min[i] = (float)(low + (double)t->m[i][3]);
-        out.max[i] = (float)(high + (double)t->m[i][3]);
+        const float *m = t->m[i];
+        double x0 = (double)m[0] * box->min[0], x1 = (double)m[0] * box->max[0];
+        double y0 = (double)m[1] * box->min[1], y1 = (double)m[1] * box->max[1];
+        double z0 = (double)m[2] * box->min[2], z1 = (double)m[2] * box->max[2];
+        out->min[i] = (float)(lower(x0, x1) + lower(y0, y1) + lower(z0, z1) + (double)m[3]);
+        out->max[i] = (float)(higher(x0, x1) + higher(y0, y1) + higher(z0, z1) + (double)m[3]);
     }
-    return out;
+}
+
+typedef struct extent {
+    double low, high;
+} extent;
+
+static inline extent grow(extent e, const float m[4], const double p[3])
+{
+    double x = m[0] * p[0] + m[1] * p[1] + m[2] * p[2] + (double)m[3];
+    return (extent){lower(x, e.low), higher(x, e.high)};
 }
 
 /* Box of the images of points. Rounding keeps order: it can wait for the end. */
-static umb_aabb move_points(const float (*points)[3], uint32_t count, const umb_transform *t)
+static void move_points(const float (*points)[3], uint32_t count, const umb_transform *t,
+                        umb_aabb *out)
 {
-    double low[3] = {INFINITY, INFINITY, INFINITY};
-    double high[3] = {-INFINITY, -INFINITY, -INFINITY};
-    for (uint32_t p = 0; p < count; ++p) {
-        double x = points[p][0], y = points[p][1], z = points[p][2];
-        for (int i = 0; i < 3; ++i) {
-            double sum = t->m[i][0] * x + t->m[i][1] * y + t->m[i][2] * z + (double)t->m[i][3];
-            low[i] = lower(sum, low[i]);
-            high[i] = higher(sum, high[i]);
-        }
+    extent x = {INFINITY, -INFINITY}, y = x, z = x;
+    for (uint32_t i = 0; i < count; ++i) {
+        const double p[3] = {points[i][0], points[i][1], points[i][2]};
+        x = grow(x, t->m[0], p);
+        y = grow(y, t->m[1], p);
+        z = grow(z, t->m[2], p);
     }
-    umb_aabb out;
-    for (int i = 0; i < 3; ++i) {
-        out.min[i] = (float)low[i];
-        out.max[i] = (float)high[i];
-    }
-    return out;
+    *out = (umb_aabb){{(float)x.low, (float)y.low, (float)z.low},
+                      {(float)x.high, (float)y.high, (float)z.high}};
 }
 
-umb_mesh_place umb_mesh_world_bounds(const umb_mesh *mesh, const umb_transform *transform)
+const umb_aabb *umb_mesh_world_bounds(const umb_mesh *mesh, const umb_transform *transform,
+                                      umb_mesh_place *out)
 {
-    umb_mesh_place place = {.block_bounds = {{0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}}};
     bool same = mesh->block_position_count == mesh->position_count;
-    bool any = mesh->block_position_count > 0;
-    if ((mesh->box && same) || keeps_boxes(transform)) {
-        place.bounds = move_corners(&mesh->bounds, transform);
-        if (any && !same) {
-            place.block_bounds = move_corners(&mesh->block_bounds, transform);
-        }
+    bool corners = (mesh->box && same) || keeps_boxes(transform);
+    const float(*points)[3] = (const float(*)[3])mesh->positions;
+    if (corners) {
+        move_corners(&mesh->bounds, transform, &out->bounds);
     } else {
-        const float(*points)[3] = (const float(*)[3])mesh->positions;
-        place.bounds = move_points(points, mesh->position_count, transform);
-        if (any && !same) {
-            place.block_bounds = move_points(points, mesh->block_position_count, transform);
-        }
+        move_points(points, mesh->position_count, transform, &out->bounds);
     }
     if (same) {
-        place.block_bounds = place.bounds;
+        return &out->bounds;
     }
-    return place;
+    if (mesh->block_position_count == 0) {
+        memset(&out->block_bounds, 0, sizeof out->block_bounds);
+    } else if (corners) {
+        move_corners(&mesh->block_bounds, transform, &out->block_bounds);
+    } else {
+        move_points(points, mesh->block_position_count, transform, &out->block_bounds);
+    }
+    return &out->block_bounds;
 }

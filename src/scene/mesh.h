@@ -64,13 +64,16 @@ void umb_mesh_destroy(const umb_allocator *allocator, umb_mesh *mesh);
  * of sizes say how long each is. NULL when there is no memory. */
 umb_mesh *umb_mesh_allocate(const umb_allocator *allocator, const umb_mesh *sizes);
 
-/* Boxes of the world vertices: of all, and of those of blocking triangles (zero when there is none).
- * They are those of what umb_transform_point() gives, to the bit but for the signs of zeros. Entries
- * are not finite where a vertex leaves the range of floats. */
+/* Boxes of the world vertices under a transform: of all, and of those of blocking triangles (zero
+ * when there is none), which is returned: one of the two in *out. They are those of what
+ * umb_transform_point() gives, to the bit but for the signs of zeros. Entries are not finite where a
+ * vertex leaves the range of floats. */
 typedef struct umb_mesh_place {
-    umb_aabb bounds, block_bounds;
+    umb_aabb bounds;
+    umb_aabb block_bounds; /* left alone when they are the same vertices */
 } umb_mesh_place;
 
-umb_mesh_place umb_mesh_world_bounds(const umb_mesh *mesh, const umb_transform *transform);
+const umb_aabb *umb_mesh_world_bounds(const umb_mesh *mesh, const umb_transform *transform,
+                                      umb_mesh_place *out);
 
 #endif

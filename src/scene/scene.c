@@ -161,51 +161,66 @@ static bool transform_is_finite(const umb_transform *t)
     return bad == 0;
 }
 
-/* Put a shape somewhere, if the place is possible. *own is the box of its vertices there, of all
- * that can be seen; as it was without a shape. */
-static umb_result place(const umb_scene *scene, umb_shape shape, const umb_transform *transform,
-                        umb_placement *out, umb_aabb *own)
+/* What a transform makes of a shape. */
+typedef struct outcome {
+    umb_mesh_place place;
+    const umb_aabb *bounds;       /* of what can be seen; NULL without a shape */
+    const umb_aabb *block_bounds; /* of what blocks; zero when nothing does */
+    bool identity, mirrored;
+} outcome;
+
+/* See where a transform puts a shape, if the place is possible. Changes nothing else: a refused call
+ * leaves the scene as it was. */
+static umb_result look(const umb_scene *scene, umb_shape shape, const umb_transform *transform,
+                       outcome *out)
 {
-    static const umb_transform identity = {{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
+    static const umb_aabb nothing = {{0, 0, 0}, {0, 0, 0}};
     if (shape > scene->shape_count) {
         return umb_scene_fail(scene, UMB_ERROR_ARGUMENT, "no shape has number %u", shape);
     }
     const umb_mesh *mesh = umb_scene_mesh(scene, shape);
-    bool stays = transform == NULL || umb_transform_is_identity(transform);
-    *out = (umb_placement){
-        .transform = stays ? identity : *transform, .shape = shape, .identity = stays};
-    if (!stays) {
-        if (!transform_is_finite(transform)) {
-            return umb_scene_fail(scene, UMB_ERROR_ARGUMENT, "a transform is not finite");
-        }
-        out->mirrored = umb_transform_mirrors(transform);
+    out->identity = transform == NULL || umb_transform_is_identity(transform);
+    out->mirrored = false;
+    out->bounds = mesh != NULL ? &mesh->bounds : NULL;
+    out->block_bounds = mesh != NULL ? &mesh->block_bounds : &nothing;
+    if (out->identity) {
+        return UMB_OK;
+    }
+    if (!transform_is_finite(transform)) {
+        return umb_scene_fail(scene, UMB_ERROR_ARGUMENT, "a transform is not finite");
     }
     if (mesh != NULL) {
-        umb_mesh_place moved = {mesh->bounds, mesh->block_bounds};
-        if (!stays) {
-            moved = umb_mesh_world_bounds(mesh, transform);
-        }
-        if (!box_is_possible(&moved.block_bounds)) {
+        out->bounds = &out->place.bounds;
+        out->block_bounds = umb_mesh_world_bounds(mesh, transform, &out->place);
+        if (!box_is_possible(out->block_bounds)) {
             return umb_scene_fail(scene, UMB_ERROR_ARGUMENT,
                                   "a transform moves vertices out of range");
         }
-        out->block_bounds = moved.block_bounds;
-        *own = moved.bounds;
     }
+    out->mirrored = umb_transform_mirrors(transform);
     return UMB_OK;
 }
 
-/* The bounds of an object: those given, or the shape's own, which *box holds if there is one. */
-static umb_result choose_bounds(const umb_scene *scene, umb_shape shape, const umb_aabb *given,
-                                umb_aabb *box)
+/* Put it there. */
+static void place(umb_placement *p, const umb_transform *transform, const outcome *seen)
 {
-    if (given == NULL && shape == 0) {
+    static const umb_transform identity = {{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
+    p->transform = seen->identity ? identity : *transform;
+    p->block_bounds = *seen->block_bounds;
+    p->identity = seen->identity;
+    p->mirrored = seen->mirrored;
+}
+
+/* The bounds of an object: those given, or the shape's own. */
+static umb_result choose_bounds(const umb_scene *scene, const umb_aabb *own, const umb_aabb *given,
+                                const umb_aabb **out)
+{
+    bool use_own = own != NULL && (given == NULL || box_is_zero(given));
+    *out = use_own ? own : given;
+    if (*out == NULL) {
         return umb_scene_fail(scene, UMB_ERROR_ARGUMENT, "an object without a shape needs bounds");
     }
-    if (given != NULL && (shape == 0 || !box_is_zero(given))) {
-        *box = *given;
-    }
-    if (!box_is_possible(box)) {
+    if (!box_is_possible(*out)) {
         return umb_scene_fail(scene, UMB_ERROR_ARGUMENT,
                               "an object's bounds are not finite or inverted");
     }
@@ -219,13 +234,18 @@ umb_result umb_scene_add_object(umb_scene *scene, const umb_object_def *def, uin
     }
     *out = UMB_NONE;
     umb_object_slot slot = {.flags = def->flags, .weld = UMB_NONE, .state = UMB_SLOT_USED};
-    umb_result result = place(scene, def->shape, &def->transform, &slot.placement, &slot.bounds);
+    outcome seen;
+    const umb_aabb *bounds = NULL;
+    umb_result result = look(scene, def->shape, &def->transform, &seen);
     if (result == UMB_OK) {
-        result = choose_bounds(scene, def->shape, &def->bounds, &slot.bounds);
+        result = choose_bounds(scene, seen.bounds, &def->bounds, &bounds);
     }
     if (result != UMB_OK) {
         return result;
     }
+    slot.placement.shape = def->shape;
+    slot.bounds = *bounds;
+    place(&slot.placement, &def->transform, &seen);
     uint32_t id = umb_ids_peek(&scene->object_ids);
     if (id >= MAX_ITEMS) {
         return umb_scene_fail(scene, UMB_ERROR_LIMIT, "more than 2^30 objects");
@@ -265,18 +285,18 @@ umb_result umb_scene_move_object(umb_scene *scene, uint32_t object, const umb_tr
     if (slot == NULL) {
         return fail_object(scene, object);
     }
-    umb_placement placement;
-    umb_aabb box = {{0, 0, 0}, {0, 0, 0}};
-    umb_result result = place(scene, slot->placement.shape, transform, &placement, &box);
+    outcome seen;
+    const umb_aabb *box = NULL;
+    umb_result result = look(scene, slot->placement.shape, transform, &seen);
     if (result == UMB_OK) {
-        result = choose_bounds(scene, placement.shape, bounds, &box);
+        result = choose_bounds(scene, seen.bounds, bounds, &box);
     }
     if (result != UMB_OK) {
         return result;
     }
     umb_weld_dissolve(scene, slot->weld);
-    slot->placement = placement;
-    slot->bounds = box;
+    place(&slot->placement, transform, &seen);
+    slot->bounds = *box;
     if (!slot->moved) {
         slot->moved = true;
         scene->moved[scene->moved_count++] = object;
@@ -319,12 +339,13 @@ umb_result umb_scene_add_occluder(umb_scene *scene, umb_shape shape, const umb_t
         return umb_scene_fail(scene, UMB_ERROR_ARGUMENT, "nowhere to put the occluder's number");
     }
     *out = UMB_NONE;
-    umb_occluder_slot slot = {.state = UMB_SLOT_USED};
-    umb_aabb own;
-    umb_result result = place(scene, shape, transform, &slot.placement, &own);
+    umb_occluder_slot slot = {.placement.shape = shape, .state = UMB_SLOT_USED};
+    outcome seen;
+    umb_result result = look(scene, shape, transform, &seen);
     if (result != UMB_OK) {
         return result;
     }
+    place(&slot.placement, transform, &seen);
     const umb_mesh *mesh = umb_scene_mesh(scene, shape);
     if (mesh == NULL || mesh->triangle_count == 0) {
         return umb_scene_fail(scene, UMB_ERROR_ARGUMENT,
