@@ -1,5 +1,5 @@
-/* Views for lights and volumes: they hold every point of what was asked for, in wider arithmetic, and no
- * more than they must; what is impossible is refused. */
+/* Views for lights and volumes: they hold every point of what was asked for, in wider
+ * arithmetic, and no more than they must; what is impossible is refused. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -16,7 +16,7 @@
 
 typedef long double wide;
 
-/* ---- references ------------------------------------------------------------------------------- */
+/* ---- references ------------------------------------------------------------------------------ */
 
 static wide wide_dot(const wide a[3], const wide b[3])
 {
@@ -30,8 +30,8 @@ static void widen3(const double a[3], wide out[3])
     }
 }
 
-/* The value of each plane of a view, as view.h defines it, at eye + d; at least 0 inside. size: what its
- * rounding is relative to. */
+/* The value of each plane of a view, as view.h defines it, at eye + d; at least 0 inside. size:
+ * what its rounding is relative to. */
 static uint32_t plane_values(const umb_view *v, const wide d[3], wide out[16], wide size[16])
 {
     wide r[3], u[3], f[3], n = 0;
@@ -128,7 +128,7 @@ static void unit_wide(const double a[3], wide out[3])
     }
 }
 
-/* ---- spot ------------------------------------------------------------------------------------- */
+/* ---- spot ------------------------------------------------------------------------------------ */
 
 /* A unit vector at a right angle to the unit vector a. */
 static void random_across(uint64_t *seed, const wide a[3], wide out[3])
@@ -215,7 +215,7 @@ static void test_spot_is_octagon(void **state)
     assert_true(fabs(inside / 100000.0 - 2 * (sqrt(2.0) - 1)) < 0.006); /* 8 tan(pi/8) / 4 */
 }
 
-/* ---- cube map --------------------------------------------------------------------------------- */
+/* ---- cube map -------------------------------------------------------------------------------- */
 
 static void test_cube(void **state)
 {
@@ -281,10 +281,10 @@ static void test_cube_axes(void **state)
     }
 }
 
-/* ---- sun -------------------------------------------------------------------------------------- */
+/* ---- sun ------------------------------------------------------------------------------------- */
 
-/* The point at which the camera's coordinates are x, y, z (x, y relative to depth in perspective), by
- * Cramer's rule on its axes as they are. */
+/* The point at which the camera's coordinates are x, y, z (x, y relative to depth in
+ * perspective), by Cramer's rule on its axes as they are. */
 static void camera_point(const umb_view *c, wide x, wide y, wide z, wide d[3])
 {
     wide r[3], u[3], f[3];
@@ -310,7 +310,8 @@ typedef struct sun_case {
     double z_min, z_max, scale;
 } sun_case;
 
-/* Cameras of all kinds; lights from anywhere, along the camera's axes, along its sides and edges. */
+/* Cameras of all kinds; lights from anywhere, along the camera's axes, along its sides and
+ * edges. */
 static void make_sun(uint64_t *seed, sun_case *s)
 {
     s->scale = pow(10.0, random_in(seed, -2, 5));
@@ -492,7 +493,7 @@ static void test_sun_is_tight(void **state)
     assert_true(inside > 20000);
 }
 
-/* ---- volumes ---------------------------------------------------------------------------------- */
+/* ---- volumes --------------------------------------------------------------------------------- */
 
 typedef struct volume_case {
     double planes[UMB_MAX_VOLUME_PLANES][4];
@@ -500,7 +501,8 @@ typedef struct volume_case {
     double middle[3], size;
 } volume_case;
 
-/* Planes around a middle, at very different distances, of any length; some doubled, some nearly so. */
+/* Planes around a middle, at very different distances, of any length; some doubled, some nearly
+ * so. */
 static void make_volume(uint64_t *seed, volume_case *c)
 {
     double scale = pow(10.0, random_in(seed, -2, 6));
@@ -641,7 +643,8 @@ static uint32_t wide_corners(const volume_case *c, wide out[64][3])
     return count;
 }
 
-/* All six sides touch the polyhedron, and whatever the view holds is in it unless planes were left out. */
+/* All six sides touch the polyhedron, and whatever the view holds is in it unless planes were
+ * left out. */
 static void test_volume_is_tight(void **state)
 {
     (void)state;
@@ -751,7 +754,7 @@ static void test_volume_of_view(void **state)
     }
 }
 
-/* ---- refusals --------------------------------------------------------------------------------- */
+/* ---- refusals -------------------------------------------------------------------------------- */
 
 static void refuse_volume(double (*planes)[4], uint32_t count, const char *word)
 {

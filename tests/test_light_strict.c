@@ -1,6 +1,6 @@
-/* Nothing that can be seen is hidden in views that lights have: micro scenes under views of eight kinds,
- * three raster sizes, against the oracle. UMBRAGE_LIGHT_SCENES sets how many views (800; small 48; full
- * 20,000), UMBRAGE_LIGHT_FIRST the number of the first one. */
+/* Nothing that can be seen is hidden in views that lights have: micro scenes under views of
+ * eight kinds, three raster sizes, against the oracle. UMBRAGE_LIGHT_SCENES sets how many views
+ * (800; small 48; full 20,000), UMBRAGE_LIGHT_FIRST the number of the first one. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -65,7 +65,8 @@ static void check_view(uint64_t i, strict_count *sums)
         answers[s] = (strict_answer){seen[s].objects, seen[s].count, labels[s],
                                      &sums[s < 3 ? kind : MAX_KINDS + kind]};
     }
-    truth_options options = {.grid_width = 64, .grid_height = 64, .guided_rays = 80000, .threads = 1};
+    truth_options options = {
+        .grid_width = 64, .grid_height = 64, .guided_rays = 80000, .threads = 1};
     assert_true(strict_check_all(oracle, micro.model, &view, answers, 4, &options));
     sums[kind].in_frustum += 3 * (uint64_t)seen[3].count;
     for (int s = 0; s < 4; ++s) {

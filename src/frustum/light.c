@@ -1,27 +1,29 @@
 /* Views for lights: a spot's cone, a cube map's faces, the sun's part of a camera's frustum.
  *
- * u is 2^-53. Axes come from umb_view_aim(): unit vectors to within 8 u, forward f within 8 u of the true
- * direction D. How far right r and up v are off right angles is not assumed but taken as computed.
+ * u is 2^-53. Axes come from umb_view_aim(): unit vectors to within 8 u, forward f within 8 u
+ * of the true direction D. How far right r and up v are off right angles is not assumed but
+ * taken as computed.
  *
- * Spot. Let t be the tangent of half the angle, d a unit vector at an angle a from D with tan a <= t. Then
- * f.d >= cos a - 8u, and r.d <= |r.D| cos a + |r| sin a, so with e = |r.f| + 8u
+ * Spot. Let t be the tangent of half the angle, d a unit vector at an angle a from D with tan a
+ * <= t. Then f.d >= cos a - 8u, and r.d <= |r.D| cos a + |r| sin a, so with e = |r.f| + 8u
  *
  *     r.d / f.d  <=  (e + (1 + 8u) t) / (1 - 8u / cos a)  <=  t + e + 16u (1 + t)^2 (1 + e) + 8u t
  *
- * as 1 / cos a <= 1 + t. The tangent itself is good to 8 units. For the diagonals (r + v) / sqrt 2 the same holds
- * with e for both axes and |r.v| t more, because their length is at most 1 + 8u + |r.v|; the rounding of such a
- * plane's normal, 4u (t + 2), shows as a slope of at most 8u (1 + t)^2 more. spot_slope() takes 256 u (1 + t)^2.
- * Range: f.d <= |f| |d|.
+ * as 1 / cos a <= 1 + t. The tangent itself is good to 8 units. For the diagonals (r + v) /
+ * sqrt 2 the same holds with e for both axes and |r.v| t more, because their length is at most
+ * 1 + 8u + |r.v|; the rounding of such a plane's normal, 4u (t + 2), shows as a slope of at
+ * most 8u (1 + t)^2 more. spot_slope() takes 256 u (1 + t)^2. Range: f.d <= |f| |d|.
  *
- * Sun. A volume V is held by a half-space n.d + c >= 0 if c is at least the greatest value of -n.d over V. V is
- * the slice swept against D by up to `reach`, so that is the greatest over the slice's eight corners, plus
- * reach * max(0, n.D). So every normal gives a valid plane, and how it was rounded does not matter: all care
- * goes into c. The corners are those of the camera as it is: with its axes as rows of a matrix, the columns R, U, F of
- * the inverse, and x, y the picture's bounds, d = z (x R + y U + F), or x R + y U + z F. The inverse's entries
- * are off by at most 8u (axes within 1e-6 of orthonormal), so a component of a corner by at most 16u (|X| + |Y| + |z|),
- * where X, Y, z are the factors; a product with n adds 4u of the same. slice.blur is 64u of the largest such
- * sum, so |n| blur covers it, |n| being the sum of absolute components.
- */
+ * Sun. A volume V is held by a half-space n.d + c >= 0 if c is at least the greatest value of
+ * -n.d over V. V is the slice swept against D by up to `reach`, so that is the greatest over
+ * the slice's eight corners, plus reach * max(0, n.D). So every normal gives a valid plane, and
+ * how it was rounded does not matter: all care goes into c. The corners are those of the camera
+ * as it is: with its axes as rows of a matrix, the columns R, U, F of the inverse, and x, y the
+ * picture's bounds, d = z (x R + y U + F), or x R + y U + z F. The inverse's entries are off by
+ * at most 8u (axes within 1e-6 of orthonormal), so a component of a corner by at most 16u (|X|
+ * + |Y| + |z|), where X, Y, z are the factors; a product with n adds 4u of the same. slice.blur
+ * is 64u of the largest such sum, so |n| blur covers it, |n| being the sum of absolute
+ * components. */
 #include "umbrage/light.h"
 
 #include "base/memory.h"
@@ -50,7 +52,7 @@ static umb_result finish(umb_view *out, const umb_view *view, umb_error *error)
     return result;
 }
 
-/* ---- spot ------------------------------------------------------------------------------------- */
+/* ---- spot ------------------------------------------------------------------------------------ */
 
 static double spot_slope(const umb_view *v, double angle)
 {
@@ -106,7 +108,7 @@ umb_result umb_view_spot(umb_view *out, const umb_spot_def *def, umb_error *erro
     return result;
 }
 
-/* ---- cube map --------------------------------------------------------------------------------- */
+/* ---- cube map -------------------------------------------------------------------------------- */
 
 umb_result umb_view_cube_face(umb_view *out, const double eye[3], umb_cube_face face,
                               double near_depth, double far_depth, umb_error *error)
@@ -135,10 +137,10 @@ umb_result umb_view_cube_face(umb_view *out, const double eye[3], umb_cube_face 
     return finish(out, &view, error);
 }
 
-/* ---- sun -------------------------------------------------------------------------------------- */
+/* ---- sun ------------------------------------------------------------------------------------- */
 
-/* A slice of a camera's frustum, relative to its eye. Corner k has the greater x, y, z where bits 0, 1, 2
- * are set. The sides' normals point inwards: the lesser and the greater x, y, z. */
+/* A slice of a camera's frustum, relative to its eye. Corner k has the greater x, y, z where
+ * bits 0, 1, 2 are set. The sides' normals point inwards: the lesser and the greater x, y, z. */
 typedef struct slice {
     umb_vec3 corners[8];
     umb_vec3 sides[6];
@@ -197,8 +199,8 @@ static double least_along(const slice *s, umb_vec3 n)
     return least - umb_vec3_sum_abs(n) * s->blur;
 }
 
-/* The most that n.d falls along the way towards the light. forward is within 8u of the light's direction;
- * its product with n loses 4u more. */
+/* The most that n.d falls along the way towards the light. forward is within 8u of the light's
+ * direction; its product with n loses 4u more. */
 static double fall(const umb_view *view, umb_vec3 n, double reach)
 {
     double slope = umb_vec3_dot(n, umb_vec3_from_double(view->forward)) +
@@ -213,7 +215,8 @@ static double hold(const umb_view *view, const slice *s, umb_vec3 n, double reac
     return fallen - least + 4.0 * U * (fabs(least) + fallen);
 }
 
-/* The rectangle and the depths. Along -forward nothing is gained towards the light, along forward `reach` is. */
+/* The rectangle and the depths. Along -forward nothing is gained towards the light, along
+ * forward `reach` is. */
 static void frame_slice(umb_view *view, const slice *s, double reach)
 {
     umb_vec3 r = umb_vec3_from_double(view->right), u = umb_vec3_from_double(view->up);
@@ -226,7 +229,8 @@ static void frame_slice(umb_view *view, const slice *s, double reach)
     view->far_depth = hold(view, s, umb_vec3_scale(f, -1.0), reach);
 }
 
-/* An edge of the slice: from the corner `from` along axis k, between a side of axis a and one of axis b. */
+/* An edge of the slice: from the corner `from` along axis k, between a side of axis a and one
+ * of axis b. */
 typedef struct edge {
     int from, to, side[2];
 } edge;
@@ -239,16 +243,16 @@ static edge slice_edge(int number)
     return e;
 }
 
-/* Edges of the outline as the light sees it: it enters through one of their sides and leaves through the
- * other. */
+/* Edges of the outline as the light sees it: it enters through one of their sides and leaves
+ * through the other. */
 static bool is_outline(const slice *s, edge e, umb_vec3 forward)
 {
     return (umb_vec3_dot(s->sides[e.side[0]], forward) > 0.0) !=
            (umb_vec3_dot(s->sides[e.side[1]], forward) > 0.0);
 }
 
-/* The normal of the plane along the light through an edge, turned to the slice's side. False where the edge
- * runs along the light. */
+/* The normal of the plane along the light through an edge, turned to the slice's side. False
+ * where the edge runs along the light. */
 static bool outline_normal(const slice *s, edge e, umb_vec3 forward, umb_vec3 *out)
 {
     umb_vec3 along = umb_vec3_sub(s->corners[e.to], s->corners[e.from]);

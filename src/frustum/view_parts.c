@@ -22,8 +22,9 @@ umb_result umb_view_aim(umb_view *out, const double direction[3], const double u
     return umb_view_look_at_ortho(out, origin, d, chosen ? stand_in : up, 2.0, 1.0, 0.0, 1.0);
 }
 
-/* The corner of the six sides with bits x, y, z of k set where the greater bound is meant, relative to
- * the eye. The axes are at right angles to within 1e-6, which is enough for a choice. */
+/* The corner of the six sides with bits x, y, z of k set where the greater bound is meant,
+ * relative to the eye. The axes are at right angles to within 1e-6, which is enough for a
+ * choice. */
 static umb_vec3 view_corner(const umb_view *v, int k)
 {
     double z = (k & 4) != 0 ? v->far_depth : v->near_depth;

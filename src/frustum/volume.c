@@ -1,25 +1,28 @@
 /* A view around a polyhedron that is given by its planes.
  *
- * What the view's members have to be are maxima of linear functions a.d over the polyhedron P of all d with
- * n_i.d + c_i >= 0. Corners of P, computed in double, would say them only to within errors that
- * nearly parallel planes make as large as one likes. So bounds come from the dual side: for any numbers
- * l_i >= 0 and every d in P
+ * What the view's members have to be are maxima of linear functions a.d over the polyhedron P
+ * of all d with n_i.d + c_i >= 0. Corners of P, computed in double, would say them only to
+ * within errors that nearly parallel planes make as large as one likes. So bounds come from the
+ * dual side: for any numbers l_i >= 0 and every d in P
  *
- *     a.d  <=  a.d + sum l_i (n_i.d + c_i)  =  (a + sum l_i n_i).d + sum l_i c_i  <=  |r| R + sum l_i c_i
+ *     a.d  <=  a.d + sum l_i (n_i.d + c_i)  =  (a + sum l_i n_i).d + sum l_i c_i
+ *          <=  |r| R + sum l_i c_i
  *
- * where r = a + sum l_i n_i, |r| is the sum of its absolute components, and R is at least every |d_k| in
- * P. That holds whatever the l_i are (Neumaier and Shcherbina's safe bounds of linear programs), so they
- * may be computed carelessly: those with r = 0 for three planes at a time, and the least bound counts.
- * At the true maximum they make it tight to a few units of rounding.
+ * where r = a + sum l_i n_i, |r| is the sum of its absolute components, and R is at least every
+ * |d_k| in P. That holds whatever the l_i are (Neumaier and Shcherbina's safe bounds of linear
+ * programs), so they may be computed carelessly: those with r = 0 for three planes at a time,
+ * and the least bound counts. At the true maximum they make it tight to a few units of
+ * rounding.
  *
- * R itself comes from the same inequality. Take a = +-e_k: R <= max (sum l c) + max |r| R, hence
- * R <= max (sum l c) / (1 - max |r|). And P is bounded: along an endless direction v of P all n_i.v >= 0, so
- * a.v <= r.v <= |r| max|v_k|, which fails for the a = +-e_k that picks v's largest component, as |r| < 1.
+ * R itself comes from the same inequality. Take a = +-e_k: R <= max (sum l c) + max |r| R,
+ * hence R <= max (sum l c) / (1 - max |r|). And P is bounded: along an endless direction v of P
+ * all n_i.v >= 0, so a.v <= r.v <= |r| max|v_k|, which fails for the a = +-e_k that picks v's
+ * largest component, as |r| < 1.
  *
- * In perspective x_max has to be at least right.d / forward.d. With a = right - b forward and a bound M of its
- * maximum, right.d <= b forward.d + M <= (b + M / near) forward.d, because forward.d >= near > 0 in P (if M is
- * negative, M / far). So any b yields a bound; the slope of the corner found gives the next b.
- */
+ * In perspective x_max has to be at least right.d / forward.d. With a = right - b forward and a
+ * bound M of its maximum, right.d <= b forward.d + M <= (b + M / near) forward.d, because
+ * forward.d >= near > 0 in P (if M is negative, M / far). So any b yields a bound; the slope of
+ * the corner found gives the next b. */
 #include "base/memory.h"
 #include "umbrage/light.h"
 #include "view_parts.h"
@@ -30,18 +33,18 @@
 /* Above all that underflow can lose. */
 #define TINY 0x1p-1000
 
-/* Planes n.d + c >= 0 relative to a point, each scaled by a power of two to a normal between 1/2 and 1, c
- * rounded upwards. */
+/* Planes n.d + c >= 0 relative to a point, each scaled by a power of two to a normal between
+ * 1/2 and 1, c rounded upwards. */
 typedef struct volume {
     uint32_t count;
     umb_vec3 n[UMB_MAX_VOLUME_PLANES];
     double c[UMB_MAX_VOLUME_PLANES];
     double reach; /* at least every |d_k| */
     uint32_t corner_count;
-    umb_vec3 corners[MAX_CORNERS]; /* about where they are: choices are made by them, bounds never */
+    umb_vec3 corners[MAX_CORNERS]; /* about: they decide choices, never bounds */
 } volume;
 
-/* ---- bounds ----------------------------------------------------------------------------------- */
+/* ---- bounds ---------------------------------------------------------------------------------- */
 
 /* Three planes, and where they meet: the cross products of their normals and their determinant. */
 typedef struct triple {
@@ -148,15 +151,16 @@ static bool find_reach(volume *v)
     double reach = 0.0;
     for (int k = 0; k < 6; ++k) {
         double s = k % 2 == 0 ? 1.0 : -1.0;
-        umb_vec3 a = umb_vec3_make(k / 2 == 0 ? s : 0.0, k / 2 == 1 ? s : 0.0, k / 2 == 2 ? s : 0.0);
+        int axis = k / 2;
+        umb_vec3 a = umb_vec3_make(axis == 0 ? s : 0.0, axis == 1 ? s : 0.0, axis == 2 ? s : 0.0);
         reach = fmax(reach, reach_along(v, a));
     }
     v->reach = reach * (1.0 + 0x1p-9); /* at least 1 / (1 - 2^-10) */
     return v->reach <= LARGEST;
 }
 
-/* By Helly's theorem at most four of the planes have nothing in common if all have. Along one of their
- * normals the bounds from both sides then cross. */
+/* By Helly's theorem at most four of the planes have nothing in common if all have. Along one
+ * of their normals the bounds from both sides then cross. */
 static bool is_empty(const volume *v)
 {
     for (uint32_t i = 0; i < v->count; ++i) {
@@ -167,7 +171,7 @@ static bool is_empty(const volume *v)
     return false;
 }
 
-/* ---- planes ----------------------------------------------------------------------------------- */
+/* ---- planes ---------------------------------------------------------------------------------- */
 
 static bool read_plane(volume *v, const double p[4], const double from[3])
 {
@@ -223,9 +227,10 @@ static const char *read_volume(const umb_volume_def *def, const double from[3], 
     return NULL;
 }
 
-/* ---- axes ------------------------------------------------------------------------------------- */
+/* ---- axes ------------------------------------------------------------------------------------ */
 
-/* How much room the smallest view along these axes takes: volume in perspective, area when parallel. */
+/* How much room the smallest view along these axes takes: volume in perspective, area when
+ * parallel. */
 static double room(const umb_view *view, const volume *v)
 {
     double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
@@ -276,8 +281,9 @@ static umb_vec3 middle_direction(const volume *v)
     return sum;
 }
 
-/* The rectangle of least area around a convex outline has a side along one of its edges. An edge of the
- * outline is a plane through the eye, or an edge of P, along the cross product of two normals. */
+/* The rectangle of least area around a convex outline has a side along one of its edges. An
+ * edge of the outline is a plane through the eye, or an edge of P, along the cross product of
+ * two normals. */
 static void try_ups(umb_view *view, const umb_volume_def *def, const volume *v, umb_vec3 forward,
                     bool edges, double *least)
 {
@@ -310,7 +316,7 @@ static bool choose_axes(umb_view *view, const umb_volume_def *def, const volume 
     return !isnan(least);
 }
 
-/* ---- the view --------------------------------------------------------------------------------- */
+/* ---- the view -------------------------------------------------------------------------------- */
 
 /* At least sign * axis.d, or that over the depth, for all of P (see the top). */
 static double side_bound(const volume *v, const umb_view *view, const double axis[3], double sign)

@@ -53,8 +53,9 @@ where="--eye -30,1.7,-4 --target 20,1.7,-3"
 held() {
     ask --method none "$@" | jq -c '.ids[]' | sort
 }
-held $where --fov 100 --size 512x512 --far 80 >square
-held $where --spot 100 --far 80 >spot
+down="--eye 0,60,0 --target 1,0,1 --far 80"
+held $down --fov 60 --size 512x512 >square
+held $down --spot 60 >spot
 echo "a spot's cone and the square around it: $(comm -13 square spot | wc -l) more, $(wc -l <spot) of $(wc -l <square)"
 held --eye 3,1.7,4 --cube -z --far 80 >face
 held --eye 3,1.7,4 --target 3,1.7,-6 --fov 90 --size 512x512 --far 80 >camera

@@ -6,7 +6,8 @@
 #include "random_boxes.h"
 #include "umbrage/light.h"
 
-/* Micro scenes lie before an eye near the origin that looks along -z, from a tenth to some tens away. */
+/* Micro scenes lie before an eye near the origin that looks along -z, from a tenth to some tens
+ * away. */
 static const double UP[3] = {0, 1, 0};
 
 static void near_origin(uint64_t *seed, double spread, double out[3])
@@ -105,7 +106,8 @@ static bool planes(uint64_t *seed, const micro_scene *micro, umb_view *out)
     return ok;
 }
 
-/* Through a triangle, as well as doubles can say it, or exactly through a face of an object's box. */
+/* Through a triangle, as well as doubles can say it, or exactly through a face of an object's
+ * box. */
 static void touching_plane(uint64_t *seed, const model *m, double plane[4])
 {
     const model_object *o = &m->objects[random_below(seed, m->object_count)];

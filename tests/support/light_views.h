@@ -1,6 +1,6 @@
-/* Views that a camera rarely has and lights do, over a micro scene: parallel ones that begin behind
- * their eye, rectangles beside the axis, extra planes at random and through the geometry, spots, cube
- * faces, cascades of a sun, volumes. */
+/* Views that a camera rarely has and lights do, over a micro scene: parallel ones that begin
+ * behind their eye, rectangles beside the axis, extra planes at random and through the
+ * geometry, spots, cube faces, cascades of a sun, volumes. */
 #ifndef LIGHT_VIEWS_H
 #define LIGHT_VIEWS_H
 

@@ -52,8 +52,9 @@ static umb_result make_spot(const options *o, const aim *a, umb_view *out, umb_e
     return umb_view_spot(out, &def, error);
 }
 
-/* How far before the slice the scene reaches towards the light: from the near depth of a view without
- * reach to the nearest corner of the scene's box, and a millionth of the sizes at hand more. */
+/* How far before the slice the scene reaches towards the light: from the near depth of a view
+ * without reach to the nearest corner of the scene's box, and a millionth of the sizes at hand
+ * more. */
 static double scene_reach(const model *m, const umb_view *sun)
 {
     double nearest = INFINITY, size = fabs(sun->near_depth);
