@@ -850,6 +850,77 @@ static void test_impossible_lights(void **state)
     REFUSE(umb_view_sun(&v, &sun, &error), (sun = plain, sun.slice_far = 6, camera.x_max = NAN))
 }
 
+/* Any number at all: bit patterns, powers of ten, plain ones. */
+static double any_number(uint64_t *seed)
+{
+    static const double special[] = {0.0, -0.0, 1.0, -1.0, 1e30, -1e30, 1e-30, 1e300, 5e-324};
+    union {
+        uint64_t bits;
+        double value;
+    } u = {random_next(seed)};
+    switch (random_below(seed, 5)) {
+    case 0:
+        return u.value;
+    case 1:
+        return special[random_below(seed, sizeof special / sizeof special[0])];
+    case 2:
+        return random_power(seed, -40, 40);
+    default:
+        return random_in(seed, -2.0, 2.0);
+    }
+}
+
+static void any_numbers(uint64_t *seed, double *out, int count)
+{
+    for (int i = 0; i < count; ++i) {
+        out[i] = any_number(seed);
+    }
+}
+
+/* Whatever goes in, what comes out is a view, or nothing at all. */
+static void test_absurd_numbers(void **state)
+{
+    (void)state;
+    uint64_t seed = 28;
+    uint32_t made[4] = {0, 0, 0, 0};
+    for (int n = 0; n < 40000; ++n) {
+        umb_view camera = random_view(&seed, 10.0), out = camera;
+        double p[UMB_MAX_VOLUME_PLANES][4], numbers[8];
+        any_numbers(&seed, numbers, 8);
+        umb_spot_def spot = {.angle = numbers[0], .near_depth = numbers[1], .range = numbers[2]};
+        any_numbers(&seed, spot.eye, 3);
+        any_numbers(&seed, spot.direction, 3);
+        any_numbers(&seed, spot.up, 3);
+        made[0] += umb_view_spot(&out, &spot, NULL) == UMB_OK;
+        assert_int_equal(umb_view_check(&out, NULL), UMB_OK);
+        made[1] += umb_view_cube_face(&out, spot.eye, (umb_cube_face)random_below(&seed, 7),
+                                      numbers[1], numbers[2], NULL) == UMB_OK;
+        assert_int_equal(umb_view_check(&out, NULL), UMB_OK);
+        umb_sun_def sun = {.camera = &camera,
+                           .slice_near = numbers[3],
+                           .slice_far = numbers[4],
+                           .reach = numbers[5]};
+        any_numbers(&seed, sun.direction, 3);
+        any_numbers(&seed, sun.up, 3);
+        double *changed[3] = {&camera.x_min, &camera.far_depth, &camera.eye[1]};
+        *changed[random_below(&seed, 3)] = numbers[6];
+        made[2] += umb_view_sun(&out, &sun, NULL) == UMB_OK;
+        assert_int_equal(umb_view_check(&out, NULL), UMB_OK);
+        umb_volume_def volume = {.planes = (const double(*)[4])p,
+                                 .plane_count = random_below(&seed, 9),
+                                 .projection = (umb_projection)random_below(&seed, 3)};
+        any_numbers(&seed, p[0], 9 * 4);
+        any_numbers(&seed, volume.eye, 3);
+        any_numbers(&seed, volume.forward, random_below(&seed, 2) == 0 ? 3 : 0);
+        any_numbers(&seed, volume.up, random_below(&seed, 2) == 0 ? 3 : 0);
+        made[3] += umb_view_from_volume(&out, &volume, NULL) == UMB_OK;
+        assert_int_equal(umb_view_check(&out, NULL), UMB_OK);
+    }
+    printf("# views made of absurd numbers: %u spots, %u faces, %u suns, %u volumes\n", made[0],
+           made[1], made[2], made[3]);
+    assert_true(made[0] > 100 && made[1] > 100 && made[2] > 100 && made[3] > 10);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -864,6 +935,7 @@ int main(void)
         cmocka_unit_test(test_volume_of_view),
         cmocka_unit_test(test_impossible_volumes),
         cmocka_unit_test(test_impossible_lights),
+        cmocka_unit_test(test_absurd_numbers),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
