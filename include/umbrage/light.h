@@ -39,7 +39,8 @@ typedef struct umb_volume_def {
  * UMB_MAX_CLIP_PLANES do, those that cut deepest. A parallel view's eye is put near the middle
  * of its near rectangle. Errors: UMB_ERROR_ARGUMENT for what is not finite, for polyhedra that
  * are empty or not bounded, and in perspective for those that are not wholly in front of the
- * eye: give a near plane. Cost: with n planes about 20 n^3 products. */
+ * eye: give a near plane. Cost: grows with the cube of plane_count; some microseconds for 6
+ * planes, the better part of a millisecond for 16. */
 UMB_API umb_result umb_view_from_volume(umb_view *out, const umb_volume_def *def, umb_error *error);
 
 typedef struct umb_spot_def {
