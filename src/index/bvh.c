@@ -37,16 +37,24 @@ static inline float higher(float a, float b)
 }
 
 /* In halves: three steps deep instead of seven. */
+static inline float lowest_of(const float x[UMB_NODE_WIDTH])
+{
+    return lower(lower(lower(x[0], x[4]), lower(x[2], x[6])),
+                 lower(lower(x[1], x[5]), lower(x[3], x[7])));
+}
+
+static inline float highest_of(const float x[UMB_NODE_WIDTH])
+{
+    return higher(higher(higher(x[0], x[4]), higher(x[2], x[6])),
+                  higher(higher(x[1], x[5]), higher(x[3], x[7])));
+}
+
 umb_aabb umb_node_bounds(const umb_node *node)
 {
     umb_aabb b;
     for (int i = 0; i < 3; ++i) {
-        const float *l = node->min[i];
-        const float *h = node->max[i];
-        b.min[i] = lower(lower(lower(l[0], l[4]), lower(l[2], l[6])),
-                         lower(lower(l[1], l[5]), lower(l[3], l[7])));
-        b.max[i] = higher(higher(higher(h[0], h[4]), higher(h[2], h[6])),
-                          higher(higher(h[1], h[5]), higher(h[3], h[7])));
+        b.min[i] = lowest_of(node->min[i]);
+        b.max[i] = highest_of(node->max[i]);
     }
     return b;
 }
@@ -242,6 +250,14 @@ static inline uint32_t highest(uint64_t word)
     return 63 - (uint32_t)__builtin_clzll(word);
 }
 
+static inline uint32_t differ(float a, float b)
+{
+    uint32_t x, y;
+    memcpy(&x, &a, sizeof x);
+    memcpy(&y, &b, sizeof y);
+    return x ^ y;
+}
+
 /* Bring a marked node's box up to its parent, which is marked when that changes it. By bits, so
  * that the result is that of a full refit to the sign of a zero. */
 static inline void lift(umb_node *nodes, const umb_bvh_marks *marks, uint32_t number)
@@ -253,15 +269,15 @@ static inline void lift(umb_node *nodes, const umb_bvh_marks *marks, uint32_t nu
     if (node->parent == UMB_NONE) {
         return;
     }
-    umb_aabb box = umb_node_bounds(node);
     umb_node *parent = &nodes[node->parent];
-    umb_aabb before;
+    uint32_t slot = node->slot, changed = 0;
     for (int i = 0; i < 3; ++i) {
-        before.min[i] = parent->min[i][node->slot];
-        before.max[i] = parent->max[i][node->slot];
+        float low = lowest_of(node->min[i]), high = highest_of(node->max[i]);
+        changed |= differ(low, parent->min[i][slot]) | differ(high, parent->max[i][slot]);
+        parent->min[i][slot] = low;
+        parent->max[i][slot] = high;
     }
-    if (memcmp(&before, &box, sizeof(box)) != 0) {
-        set_slot(parent, node->slot, box.min, box.max, UMB_REF_NODE | number);
+    if (changed != 0) {
         mark(marks, node->parent);
     }
 }
@@ -282,11 +298,22 @@ static void lift_all(umb_node *nodes, const umb_bvh_marks *marks)
     }
 }
 
+/* How many moves ahead nodes are asked for: all that is looked at before is in the caches. */
+#define AHEAD 8
+
 void umb_bvh_refit_moved(umb_node *nodes, umb_bvh_marks *marks, const uint32_t *places,
                          const umb_committed *scene)
 {
     for (uint32_t i = 0; i < scene->moved_count; ++i) {
         uint32_t place = places[scene->moved[i]];
+        if (i + AHEAD < scene->moved_count) {
+            uint32_t next = places[scene->moved[i + AHEAD]];
+            const umb_node *node = &nodes[next != UMB_NONE ? next / UMB_NODE_WIDTH : 0];
+            __builtin_prefetch(node->min, 1);
+            __builtin_prefetch(node->min[2], 1);
+            __builtin_prefetch(node->max[1], 1);
+            __builtin_prefetch(node->ref, 1);
+        }
         if (place != UMB_NONE) {
             const umb_aabb *box = &scene->objects[scene->moved[i]].bounds;
             umb_node *node = &nodes[place / UMB_NODE_WIDTH];

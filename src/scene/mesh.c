@@ -292,13 +292,12 @@ void umb_mesh_destroy(const umb_allocator *allocator, umb_mesh *mesh)
 /* True if each row looks at one axis at most. */
 static bool keeps_boxes(const umb_transform *t)
 {
-    uint32_t bits[12], used[12], oblique = 0;
-    memcpy(bits, t->m, sizeof bits);
-    for (int i = 0; i < 12; ++i) {
-        used[i] = (bits[i] & 0x7FFFFFFFu) != 0;
-    }
-    for (int i = 0; i < 12; i += 4) {
-        oblique |= (used[i] & used[i + 1]) | (used[i + 1] & used[i + 2]) | (used[i + 2] & used[i]);
+    uint32_t oblique = 0;
+    for (int i = 0; i < 3; ++i) {
+        uint32_t bits[3];
+        memcpy(bits, t->m[i], sizeof bits);
+        bool x = bits[0] << 1 != 0, y = bits[1] << 1 != 0, z = bits[2] << 1 != 0;
+        oblique |= (uint32_t)((x & y) | (y & z) | (z & x));
     }
     return oblique == 0;
 }

@@ -39,6 +39,9 @@ static bool all_behind(const umb_mesh *m, const uint32_t triangle[3])
     const float *c = m->positions[triangle[2]];
     bool solid = false;
     for (uint32_t i = 0; i < m->block_position_count; ++i) {
+        if (i == triangle[0] || i == triangle[1] || i == triangle[2]) {
+            continue;
+        }
         int side = umb_orient(a, b, c, m->positions[i]);
         if (side > 0) {
             return false;

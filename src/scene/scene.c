@@ -212,11 +212,14 @@ static void place(umb_placement *p, const umb_transform *transform, const outcom
 }
 
 /* The bounds of an object: those given, or the shape's own. */
-static umb_result choose_bounds(const umb_scene *scene, const umb_aabb *own, const umb_aabb *given,
+static umb_result choose_bounds(const umb_scene *scene, const outcome *seen, const umb_aabb *given,
                                 const umb_aabb **out)
 {
-    bool use_own = own != NULL && (given == NULL || box_is_zero(given));
-    *out = use_own ? own : given;
+    bool use_own = seen->bounds != NULL && (given == NULL || box_is_zero(given));
+    *out = use_own ? seen->bounds : given;
+    if (use_own && seen->bounds == seen->block_bounds) {
+        return UMB_OK; /* look() has found them possible */
+    }
     if (*out == NULL) {
         return umb_scene_fail(scene, UMB_ERROR_ARGUMENT, "an object without a shape needs bounds");
     }
@@ -238,7 +241,7 @@ umb_result umb_scene_add_object(umb_scene *scene, const umb_object_def *def, uin
     const umb_aabb *bounds = NULL;
     umb_result result = look(scene, def->shape, &def->transform, &seen);
     if (result == UMB_OK) {
-        result = choose_bounds(scene, seen.bounds, &def->bounds, &bounds);
+        result = choose_bounds(scene, &seen, &def->bounds, &bounds);
     }
     if (result != UMB_OK) {
         return result;
@@ -289,7 +292,7 @@ umb_result umb_scene_move_object(umb_scene *scene, uint32_t object, const umb_tr
     const umb_aabb *box = NULL;
     umb_result result = look(scene, slot->placement.shape, transform, &seen);
     if (result == UMB_OK) {
-        result = choose_bounds(scene, seen.bounds, bounds, &box);
+        result = choose_bounds(scene, &seen, bounds, &box);
     }
     if (result != UMB_OK) {
         return result;
