@@ -10,6 +10,7 @@
 #include <time.h>
 
 #include "frustum/box_kernels.h"
+#include "occlusion/raster_map.h"
 #include "yardstick.h"
 
 static uint64_t random_state = 88172645463325252u;
@@ -68,11 +69,14 @@ static void free_boxes(boxes *b)
     }
 }
 
+enum { UPRIGHT, TURNED, PARALLEL, FORMS };
+
 typedef struct job {
     boxes *boxes;
     umb_view view;
     umb_frustum frustum;
-    umb_projector projector;
+    umb_projector projectors[FORMS];
+    int form;
     const umb_box_kernels *kernels;
     float planes[6][4];
     uint64_t sum; /* of answers, so that no work can be left out */
@@ -99,8 +103,8 @@ static void run_project(job *j)
 {
     for (uint32_t i = 0; i < j->boxes->count / 8; ++i) {
         umb_projected out;
-        j->kernels->project(&j->boxes->nodes[i], &j->projector, &out);
-        j->sum += out.x_min[7] > 0.0;
+        j->kernels->project(&j->boxes->nodes[i], &j->projectors[j->form], &out);
+        j->sum += out.testable;
     }
 }
 
@@ -120,6 +124,44 @@ static double measure(job *j, void (*run)(job *))
     return best * 1e9;
 }
 
+/* As a culler lays its raster: upright, turned, parallel. */
+static void prepare_projectors(job *j)
+{
+    for (int form = 0; form < FORMS; ++form) {
+        umb_view view = j->view;
+        double table[288 + 8], x[3], y[3], w[3];
+        umb_raster_map map;
+        if (form != UPRIGHT) {
+            memset(view.vertical, 0, sizeof(view.vertical));
+        }
+        view.projection = form == PARALLEL ? UMB_ORTHOGRAPHIC : UMB_PERSPECTIVE;
+        umb_raster_map_prepare(&map, &view, table);
+        const umb_vec3 rows[3] = {map.x, map.y, map.w};
+        double *out[3] = {x, y, w};
+        for (int i = 0; i < 3; ++i) {
+            out[i][0] = rows[i].x;
+            out[i][1] = rows[i].y;
+            out[i][2] = rows[i].z;
+        }
+        umb_projector_def def = {.eye = view.eye,
+                                 .x = x,
+                                 .y = y,
+                                 .w = w,
+                                 .cx = map.cx,
+                                 .cy = map.cy,
+                                 .slope = map.rows.slope,
+                                 .extra = map.rows.extra,
+                                 .from = map.rows.from,
+                                 .span = map.rows.span,
+                                 .slack = map.rows.slack,
+                                 .width = map.width,
+                                 .height = map.height,
+                                 .vertical = map.vertical_axis,
+                                 .orthographic = map.orthographic};
+        umb_projector_prepare(&j->projectors[form], &def);
+    }
+}
+
 static bool set_view(job *j)
 {
     double eye[3] = {0, 20, 0}, target[3] = {300, 10, 400}, up[3] = {0, 1, 0};
@@ -134,13 +176,7 @@ static bool set_view(job *j)
         }
     }
     umb_frustum_prepare(&j->frustum, &j->view);
-    memset(&j->projector, 0, sizeof(j->projector));
-    for (int i = 0; i < 3; ++i) {
-        j->projector.eye[i] = eye[i];
-        j->projector.x[i] = 500.0 * j->view.right[i];
-        j->projector.y[i] = -500.0 * j->view.up[i];
-        j->projector.w[i] = j->view.forward[i];
-    }
+    prepare_projectors(j);
     return true;
 }
 
@@ -160,12 +196,13 @@ static bool bench(uint32_t count)
             j.kernels = umb_box_kernels_get(isas[i]);
             if (j.kernels != NULL) {
                 double cull = measure(&j, run_cull);
-                j.projector.orthographic = false;
-                double project = measure(&j, run_project);
-                j.projector.orthographic = true;
-                double parallel = measure(&j, run_project);
-                printf("  %-8s %6.2f (%4.1f)      %6.2f (%4.1f), parallel %6.2f\n",
-                       umb_isa_name(isas[i]), cull, cull / unit, project, project / unit, parallel);
+                double project[FORMS];
+                for (j.form = 0; j.form < FORMS; ++j.form) {
+                    project[j.form] = measure(&j, run_project);
+                }
+                printf("  %-8s %6.2f (%4.1f)      upright %6.2f (%4.1f), turned %6.2f, parallel %6.2f\n",
+                       umb_isa_name(isas[i]), cull, cull / unit, project[UPRIGHT], project[UPRIGHT] / unit,
+                       project[TURNED], project[PARALLEL]);
             }
         }
         fprintf(stderr, "sum of answers %llu\n", (unsigned long long)j.sum);

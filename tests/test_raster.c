@@ -8,10 +8,13 @@
 
 #include <cmocka.h>
 
+#include "base/isa.h"
 #include "occlusion/method.h"
 #include "occlusion/raster_map.h"
 #include "scene/scene.h"
 #include "support/micro_scenes.h"
+
+static const umb_isa isas[] = {UMB_ISA_SCALAR, UMB_ISA_SSE4, UMB_ISA_AVX2, UMB_ISA_NEON};
 
 typedef struct point {
     long double x, y, z;
@@ -93,7 +96,7 @@ static long double blocked_at(const umb_raster_map *map, const model *m, long do
             long double depth;
             if ((mesh->flags[k] & UMB_TRIANGLE_OPEN) == 0 &&
                 meets(from, along, t, (mesh->flags[k] & UMB_TRIANGLE_TWO_SIDED) != 0, &depth) &&
-                depth >= map->near_depth && depth < nearest) {
+                depth >= map->near_cut && depth < nearest) {
                 nearest = depth;
             }
         }
@@ -121,7 +124,8 @@ static uint64_t check_buffer(const umb_raster_map *map, const umb_coverage *b, c
             double corner_x = unit(&seed), corner_y = unit(&seed);
             double fx = corner_x < 0.3 ? 1e-6 : corner_x > 0.7 ? 1 - 1e-6 : corner_x;
             double fy = corner_y < 0.3 ? 1e-6 : corner_y > 0.7 ? 1 - 1e-6 : corner_y;
-            long double depth = blocked_at(map, m, x + fx, y + fy);
+            double top = map->rows.edge[y], high = map->rows.edge[y + 1] - top;
+            long double depth = blocked_at(map, m, x + fx, top + fy * high);
             long double z = t->z[4 * (y % 8 / 4) + x % 32 / 8];
             bool ok = map->orthographic ? -depth > z : 1.0L / depth > z;
             if (depth == INFINITY || !ok) {
@@ -149,11 +153,13 @@ static void test_invariant(void **state)
         micro.view.buffer_width = 70;
         micro.view.buffer_height = 45;
         umb_raster_map map;
-        umb_raster_map_prepare(&map, &micro.view);
+        double rows[53];
+        umb_raster_map_prepare(&map, &micro.view, rows);
         const umb_committed *committed = umb_scene_committed(scene);
         void *raster;
         umb_cull_stats stats = {0};
-        assert_int_equal(umb_raster_method.create(umb_scene_allocator(scene), &raster), UMB_OK);
+        assert_int_equal(umb_raster_method.create(umb_scene_allocator(scene), umb_isa_available(isas[i % 4]) ? isas[i % 4] : UMB_ISA_SCALAR,
+                                                   &raster), UMB_OK);
         assert_int_equal(umb_raster_method.prepare(raster, &map, committed), UMB_OK);
         for (uint32_t k = 0; k < committed->occluder_count; ++k) {
             (void)umb_raster_method.occlude(raster, k, &stats);

@@ -45,7 +45,9 @@ typedef struct umb_cull_stats {
 
 /* The answer. Borrowed: valid until the culler's next call. */
 typedef struct umb_visible_set {
-    const uint32_t *objects; /* ids, by nearest view depth of their bounds, ties by id */
+    /* Ids, nearest bounds first, ties by id: by least depth along the view's forward, which is levelled where
+       the view names a vertical and looks about along the ground. */
+    const uint32_t *objects;
     const uint8_t *inside;   /* beside each id: 1 if its bounds are wholly inside the frustum, else 0 */
     uint32_t count;
     umb_class class_;        /* what this answer promises */
@@ -66,7 +68,8 @@ UMB_API umb_result umb_cull(umb_culler *culler, const umb_view *view, umb_visibl
 
 /* The occlusion buffer after the last umb_cull: for each pixel, row by row from the top, 1 / depth
  * of a bound that what covers it lies in front of; 0 where not covered. For orthographic views the
- * value is 1 / (1 + depth - near depth). Returns false, with the sizes only, when pixels is NULL or
+ * value is 1 / (1 + depth - near depth). The raster is the method's own: upright and dense at the horizon
+ * where the view names a vertical. Returns false, with the sizes only, when pixels is NULL or
  * capacity (in floats) is too small, or when the method has no buffer (sizes 0). */
 UMB_API bool umb_culler_read_buffer(const umb_culler *culler, float *pixels, size_t capacity,
                                     uint32_t *width, uint32_t *height);

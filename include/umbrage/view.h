@@ -33,6 +33,10 @@ typedef struct umb_view {
     /* Unit vectors at right angles, to within 1e-6. right x up points at the viewer or away: both
        handednesses are fine. */
     double right[3], up[3], forward[3];
+    /* The scene's vertical, where gravity points or away from it, of any length; zero: unknown. It changes
+       how tight an answer is, never whether it is right: with it, the raster of a perspective view stands
+       upright whatever the roll and pitch, and most of its rows are at the horizon. */
+    double vertical[3];
     umb_projection projection;
     /* Perspective: slopes at depth 1. Orthographic: distances. x_min < x_max, y_min < y_max. */
     double x_min, x_max, y_min, y_max;
@@ -66,7 +70,7 @@ typedef struct umb_matrix_def {
 
 /* Look from eye at target. fov_y: full vertical angle in radians, in (0, pi). aspect: width /
  * height. Where the direction runs along up (squared sine of the angle at most 1e-12) the axis
- * after up's largest component takes up's place (x, y, z, x). Errors: UMB_ERROR_ARGUMENT for
+ * after up's largest component takes up's place (x, y, z, x). up becomes the view's vertical. Errors: UMB_ERROR_ARGUMENT for
  * non-finite input, eye equal to target, impossible angles or depths. The sizes, thresholds and
  * planes of *out are zeroed. */
 UMB_API umb_result umb_view_look_at(umb_view *out, const double eye[3], const double target[3],

@@ -13,9 +13,11 @@
  */
 #include "culler.h"
 
+#include <float.h>
 #include <string.h>
 
 #include "base/memory.h"
+#include "contribution.h"
 #include "detail.h"
 #include "found.h"
 #include "frustum/box_kernels.h"
@@ -38,8 +40,9 @@ struct umb_culler {
     umb_found *found; /* as they are reported */
     uint32_t *objects;
     uint8_t *inside;
+    double *rows;    /* the raster's table of rows */
     uint8_t *planes; /* per node: the plane that all its boxes failed last time (plane coherency) */
-    size_t found_capacity, object_capacity, inside_capacity, plane_capacity;
+    size_t found_capacity, object_capacity, inside_capacity, plane_capacity, row_capacity;
     uint32_t count;
     bool answered;
     umb_view view;    /* of the last answer */
@@ -54,8 +57,8 @@ typedef struct walk {
     umb_frustum frustum;
     umb_raster_map map;
     umb_projector projector;
-    double picture_x, picture_y; /* picture pixels in one raster pixel */
-    double min_pixels;
+    const umb_view *view;
+    float most_w;
     uint32_t drawn;
     umb_cull_stats stats;
 } walk;
@@ -83,7 +86,7 @@ umb_result umb_culler_create(const umb_index *index, const umb_culler_def *def, 
     c->def = *def;
     c->kernels = kernels;
     c->ops = umb_method_get(def->method);
-    if (c->ops != NULL && c->ops->create(allocator, &c->method) != UMB_OK) {
+    if (c->ops != NULL && c->ops->create(allocator, def->isa, &c->method) != UMB_OK) {
         umb_memory_free(allocator, c, sizeof *c);
         return umb_error_set(def->error, UMB_ERROR_MEMORY, "no memory for a culler");
     }
@@ -105,16 +108,21 @@ void umb_culler_destroy(umb_culler *c)
     umb_memory_free(&a, c->objects, c->object_capacity * sizeof *c->objects);
     umb_memory_free(&a, c->inside, c->inside_capacity);
     umb_memory_free(&a, c->planes, c->plane_capacity);
+    umb_memory_free(&a, c->rows, c->row_capacity * sizeof *c->rows);
     umb_memory_free(&a, c, sizeof *c);
 }
 
 /* Everything that a walk can need, so that it never allocates: each item and node waits at most
  * once. */
-static bool reserve(umb_culler *c, const umb_tree *tree, const umb_committed *scene)
+static bool reserve(umb_culler *c, const umb_view *view, const umb_tree *tree, const umb_committed *scene)
 {
     const umb_allocator *a = &c->allocator;
     size_t planes = c->plane_capacity;
-    if (!umb_heap_reserve(&c->heap, a, (size_t)tree->item_count + tree->node_count) ||
+    uint32_t width, height;
+    umb_raster_map_size(view, &width, &height);
+    if (!umb_memory_reserve(a, (void **)&c->rows, &c->row_capacity, umb_raster_map_table(height),
+                            sizeof *c->rows) ||
+        !umb_heap_reserve(&c->heap, a, (size_t)tree->item_count + tree->node_count) ||
         !umb_memory_reserve(a, (void **)&c->found, &c->found_capacity, scene->object_count,
                             sizeof *c->found) ||
         !umb_memory_reserve(a, (void **)&c->objects, &c->object_capacity, scene->object_count,
@@ -129,13 +137,10 @@ static bool reserve(umb_culler *c, const umb_tree *tree, const umb_committed *sc
     return true;
 }
 
-static bool hidden(walk *w, uint32_t ref, const umb_image *image)
+static bool hidden(walk *w, const umb_image *image)
 {
-    if (w->culler->ops == NULL) {
-        return false;
-    }
     umb_asker asker = {w->culler->ops, w->culler->method, &w->map, &w->stats};
-    return umb_detail_hidden(&asker, ref, image, NULL);
+    return umb_detail_hidden(&asker, image, NULL);
 }
 
 static void count_hidden(walk *w, uint32_t ref)
@@ -145,45 +150,41 @@ static void count_hidden(walk *w, uint32_t ref)
     w->stats.hidden_objects += kind == UMB_REF_OBJECT;
 }
 
-/* Contribution culling: too small in the picture both ways. */
-static bool too_small(walk *w, uint32_t ref, const umb_image_bounds *b)
+static bool too_small(walk *w, const umb_node *node, uint32_t slot)
 {
-    if (!(w->min_pixels > 0.0) || (ref & UMB_REF_KIND) == UMB_REF_OCCLUDER) {
+    uint32_t kind = node->ref[slot] & UMB_REF_KIND;
+    if (!(w->view->min_pixels > 0.0) || kind == UMB_REF_OCCLUDER) {
         return false;
     }
-    bool small = (b->x_max - b->x_min) * w->picture_x < w->min_pixels &&
-                 (b->y_max - b->y_min) * w->picture_y < w->min_pixels;
-    w->stats.small += small && (ref & UMB_REF_KIND) == UMB_REF_OBJECT;
+    umb_aabb box;
+    for (int i = 0; i < 3; ++i) {
+        box.min[i] = node->min[i][slot];
+        box.max[i] = node->max[i][slot];
+    }
+    bool small = umb_contribution_small(w->view, &box);
+    w->stats.small += small && kind == UMB_REF_OBJECT;
     return small;
 }
 
-static void consider(walk *w, const umb_node *node, const umb_projected *p, uint32_t slot,
-                     uint16_t planes)
+static void push(walk *w, const umb_node *node, const umb_projected *p, uint32_t slot, uint16_t planes)
 {
-    umb_waiting item = {0};
-    item.nearest = p->w_min[slot];
-    item.settled = p->w_max[slot] < w->map.far_depth ? p->w_max[slot] : w->map.far_depth;
-    item.ref = node->ref[slot];
-    item.planes = planes;
-    item.stamp = w->drawn;
-    item.testable = item.nearest >= w->map.near_depth && (w->map.orthographic || item.nearest > 0.0);
-    w->stats.in_frustum += (item.ref & UMB_REF_KIND) == UMB_REF_OBJECT;
-    if (item.testable) {
-        umb_image_bounds b = {p->x_min[slot], p->y_min[slot], p->x_max[slot],
-                              p->y_max[slot], p->w_min[slot], p->w_max[slot]};
-        if (too_small(w, item.ref, &b)) {
-            return;
-        }
-        item.image = umb_image_of_bounds(&w->map, &b);
-        if (hidden(w, item.ref, &item.image)) {
-            count_hidden(w, item.ref);
-            return;
-        }
-    }
     umb_heap *heap = &w->culler->heap;
     uint32_t taken = umb_heap_take(heap);
-    heap->slots[taken] = item;
-    umb_heap_push(heap, item.nearest, taken);
+    umb_waiting *item = &heap->slots[taken];
+    item->nearest = p->w_min[slot];
+    item->settled = p->w_max[slot] < w->most_w ? p->w_max[slot] : w->most_w;
+    item->ref = node->ref[slot];
+    item->stamp = w->drawn;
+    item->image.rect.x0 = (int16_t)p->x0[slot];
+    item->image.rect.y0 = (int16_t)p->y0[slot];
+    item->image.rect.x1 = (int16_t)p->x1[slot];
+    item->image.rect.y1 = (int16_t)p->y1[slot];
+    item->image.nearness = p->nearness[slot];
+    item->part = 0;
+    item->planes = planes;
+    item->testable = (p->testable >> slot & 1u) != 0;
+    item->waited = false;
+    umb_heap_push(heap, item->nearest, taken);
 }
 
 static void open_node(walk *w, uint32_t number, uint16_t planes)
@@ -201,9 +202,19 @@ static void open_node(walk *w, uint32_t number, uint16_t planes)
     }
     umb_projected projected;
     c->kernels->project(node, &w->projector, &projected);
-    for (uint32_t slot = 0; slot < node->count; ++slot) {
-        if ((left >> slot & 1u) != 0) {
-            consider(w, node, &projected, slot, child_planes[slot]);
+    uint32_t hides = projected.beside & left;
+    if (c->ops != NULL) {
+        uint32_t ask = projected.testable & left & ~hides;
+        hides |= c->ops->hides(c->method, &projected, ask);
+        w->stats.queries += (uint32_t)__builtin_popcount(ask);
+    }
+    for (; left != 0; left &= left - 1) {
+        uint32_t slot = (uint32_t)__builtin_ctz(left);
+        w->stats.in_frustum += (node->ref[slot] & UMB_REF_KIND) == UMB_REF_OBJECT;
+        if ((hides >> slot & 1u) != 0) {
+            count_hidden(w, node->ref[slot]);
+        } else if (!too_small(w, node, slot)) {
+            push(w, node, &projected, slot, child_planes[slot]);
         }
     }
 }
@@ -233,11 +244,11 @@ static void report(walk *w, const umb_waiting *item)
 /* True if the object may be seen, asked in detail when its shape is all that is drawn. */
 static bool object_shows(walk *w, const umb_object *o, umb_waiting *item)
 {
-    if (w->culler->ops == NULL || !o->refine || o->mesh->seen_count == 0) {
+    if (w->culler->ops == NULL || !umb_detail_helps(o)) {
         return true;
     }
     umb_asker asker = {w->culler->ops, w->culler->method, &w->map, &w->stats};
-    return umb_detail_shows(&asker, o, item->ref, &item->part, &item->settled);
+    return umb_detail_shows(&asker, o, &item->part, &item->settled);
 }
 
 /* An object whose turn has come. It is reported only when everything that can hide it has been
@@ -280,7 +291,7 @@ static void run(walk *w)
         umb_heap_entry entry = umb_heap_pop(heap);
         umb_waiting *item = &heap->slots[entry.slot];
         bool waits = false;
-        if (item->testable && item->stamp != w->drawn && hidden(w, item->ref, &item->image)) {
+        if (item->testable && item->stamp != w->drawn && hidden(w, &item->image)) {
             count_hidden(w, item->ref);
         } else if ((item->ref & UMB_REF_KIND) == UMB_REF_NODE) {
             open_node(w, item->ref & UMB_REF_NUMBER, item->planes);
@@ -297,27 +308,36 @@ static void run(walk *w)
 
 static void prepare_projector(umb_projector *p, const umb_raster_map *map)
 {
-    *p = (umb_projector){.eye = {map->eye.x, map->eye.y, map->eye.z},
-                         .x = {map->x.x, map->x.y, map->x.z},
-                         .y = {map->y.x, map->y.y, map->y.z},
-                         .w = {map->w.x, map->w.y, map->w.z},
-                         .cx = map->cx,
-                         .cy = map->cy,
-                         .orthographic = map->orthographic};
+    const double eye[3] = {map->eye.x, map->eye.y, map->eye.z}, x[3] = {map->x.x, map->x.y, map->x.z};
+    const double y[3] = {map->y.x, map->y.y, map->y.z}, w[3] = {map->w.x, map->w.y, map->w.z};
+    const umb_projector_def def = {.eye = eye,
+                                   .x = x,
+                                   .y = y,
+                                   .w = w,
+                                   .cx = map->cx,
+                                   .cy = map->cy,
+                                   .slope = map->rows.slope,
+                                   .extra = map->rows.extra,
+                                   .from = map->rows.from,
+                                   .span = map->rows.span,
+                                   .slack = map->rows.slack,
+                                   .width = map->width,
+                                   .height = map->height,
+                                   .vertical = map->vertical_axis,
+                                   .orthographic = map->orthographic};
+    umb_projector_prepare(p, &def);
 }
 
 static void prepare_walk(walk *w, umb_culler *c, const umb_view *view)
 {
-    memset(w, 0, sizeof *w);
     w->culler = c;
-    w->tree = umb_index_tree(c->index);
-    w->scene = umb_scene_committed(umb_index_scene(c->index));
+    w->view = view;
+    w->drawn = 0;
+    w->stats = (umb_cull_stats){0};
     umb_frustum_prepare(&w->frustum, view);
-    umb_raster_map_prepare(&w->map, view);
+    umb_raster_map_prepare(&w->map, view, c->rows);
     prepare_projector(&w->projector, &w->map);
-    w->picture_x = (view->width != 0 ? view->width : 1024.0) / w->map.width;
-    w->picture_y = (view->height != 0 ? view->height : 512.0) / w->map.height;
-    w->min_pixels = view->min_pixels;
+    w->most_w = w->map.most_w < FLT_MAX ? (float)w->map.most_w : INFINITY;
 }
 
 umb_result umb_cull(umb_culler *c, const umb_view *view, umb_visible_set *out)
@@ -330,13 +350,18 @@ umb_result umb_cull(umb_culler *c, const umb_view *view, umb_visible_set *out)
         return result;
     }
     walk w;
-    prepare_walk(&w, c, view);
+    w.tree = umb_index_tree(c->index);
+    w.scene = umb_scene_committed(umb_index_scene(c->index));
     if (w.tree->version != w.scene->version) {
         return umb_error_set(c->def.error, UMB_ERROR_STATE,
                              "the index found no memory at the last commit: commit again");
     }
-    if (!reserve(c, w.tree, w.scene) ||
-        (c->ops != NULL && c->ops->prepare(c->method, &w.map, w.scene) != UMB_OK)) {
+    bool ready = reserve(c, view, w.tree, w.scene);
+    if (ready) {
+        prepare_walk(&w, c, view);
+        ready = c->ops == NULL || c->ops->prepare(c->method, &w.map, w.scene) == UMB_OK;
+    }
+    if (!ready) {
         return umb_error_set(c->def.error, UMB_ERROR_MEMORY, "no memory for the frame");
     }
     umb_heap_clear(&c->heap);

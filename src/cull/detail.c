@@ -4,14 +4,22 @@
 
 #include "geometry/transform.h"
 
-bool umb_detail_hidden(const umb_asker *a, uint32_t ref, const umb_image *image,
-                       const umb_outline *outline)
+bool umb_detail_hidden(const umb_asker *a, const umb_image *image, const umb_outline *outline)
 {
-    umb_query query = {*image, outline, ref};
-    umb_verdict verdict;
-    a->ops->submit(a->method, &query, 1, &verdict);
     a->stats->queries += 1;
-    return verdict == UMB_VERDICT_HIDDEN;
+    return a->ops->hidden(a->method, image, outline);
+}
+
+/* A box that stands along the axes is its own bounds. */
+bool umb_detail_helps(const umb_object *o)
+{
+    if (!o->refine || o->mesh->seen_count == 0) {
+        return false;
+    }
+    const float (*m)[4] = o->transform.m;
+    bool along = o->identity || (m[0][1] == 0.0f && m[0][2] == 0.0f && m[1][0] == 0.0f &&
+                                 m[1][2] == 0.0f && m[2][0] == 0.0f && m[2][1] == 0.0f);
+    return !(o->mesh->box && along);
 }
 
 static void place_triangle(const umb_object *o, const uint32_t corner[3], float world[3][3])
@@ -28,7 +36,7 @@ static void place_triangle(const umb_object *o, const uint32_t corner[3], float 
 
 /* True if the middle of a triangle is open to the eye: most visible things are found by this
  * alone. */
-static bool middle_shows(const umb_asker *a, const float world[3][3], double *settled)
+static bool middle_shows(const umb_asker *a, const float world[3][3], float *settled)
 {
     const umb_raster_map *map = a->map;
     umb_view_point middle = {0.0, 0.0, 0.0, 0.0};
@@ -40,17 +48,17 @@ static bool middle_shows(const umb_asker *a, const float world[3][3], double *se
         middle.w += v.w * (1.0 / 3.0);
         deepest = v.w > deepest ? v.w : deepest;
     }
-    if (!(middle.w > map->near_depth && middle.w < map->far_depth)) {
+    if (!(middle.w > map->least_w && middle.w < map->most_w)) {
         return false;
     }
     double r = map->orthographic ? 1.0 : 1.0 / middle.w;
-    *settled = deepest < map->far_depth ? deepest : map->far_depth;
+    *settled = (float)(deepest < map->most_w ? deepest : map->most_w);
     return a->ops->open_at(a->method, middle.x * r + map->cx, middle.y * r + map->cy,
                            map->orthographic ? -middle.w : r);
 }
 
 static bool leaf_middle_shows(const umb_asker *a, const umb_object *o, const umb_part *part,
-                              double *settled)
+                              float *settled)
 {
     for (uint32_t i = part->begin; i < part->end; ++i) {
         float world[3][3];
@@ -62,8 +70,8 @@ static bool leaf_middle_shows(const umb_asker *a, const umb_object *o, const umb
     return false;
 }
 
-static bool triangle_shows(const umb_asker *a, uint32_t ref, const float world[3][3],
-                           const umb_face *face, double *settled)
+static bool triangle_shows(const umb_asker *a, const float world[3][3],
+                           const umb_face *face, float *settled)
 {
     umb_image_bounds b;
     umb_outline outline;
@@ -74,16 +82,16 @@ static bool triangle_shows(const umb_asker *a, uint32_t ref, const float world[3
         *settled = -INFINITY;
         return true;
     default: {
-        *settled = b.w_max;
+        *settled = (float)b.w_max;
         umb_image image = umb_image_of_bounds(a->map, &b);
-        return !umb_detail_hidden(a, ref, &image, &outline);
+        return !umb_detail_hidden(a, &image, &outline);
     }
     }
 }
 
 /* Triangles that face the eye are asked first: one of them shows most visible things. */
-static bool leaf_shows(const umb_asker *a, const umb_object *o, uint32_t ref, const umb_part *part,
-                       double *settled)
+static bool leaf_shows(const umb_asker *a, const umb_object *o, const umb_part *part,
+                       float *settled)
 {
     const umb_mesh *mesh = o->mesh;
     for (int away = 0; away < 2; ++away) {
@@ -92,7 +100,7 @@ static bool leaf_shows(const umb_asker *a, const umb_object *o, uint32_t ref, co
             place_triangle(o, mesh->triangles[mesh->part_order[i]], world);
             umb_face face = umb_face_of(a->map, world[0], world[1], world[2]);
             if ((face.distance > 0.0) == (away == 0) &&
-                triangle_shows(a, ref, (const float(*)[3])world, &face, settled)) {
+                triangle_shows(a, (const float(*)[3])world, &face, settled)) {
                 return true;
             }
         }
@@ -100,7 +108,7 @@ static bool leaf_shows(const umb_asker *a, const umb_object *o, uint32_t ref, co
     return false;
 }
 
-static bool box_shows(const umb_asker *a, const umb_object *o, uint32_t ref, uint32_t part)
+static bool box_shows(const umb_asker *a, const umb_object *o, uint32_t part)
 {
     if (part == 0 && o->identity) {
         return true; /* the object's bounds */
@@ -113,13 +121,13 @@ static bool box_shows(const umb_asker *a, const umb_object *o, uint32_t ref, uin
         return true;
     default: {
         umb_image image = umb_image_of_bounds(a->map, &b);
-        return !umb_detail_hidden(a, ref, &image, NULL);
+        return !umb_detail_hidden(a, &image, NULL);
     }
     }
 }
 
-bool umb_detail_shows(const umb_asker *a, const umb_object *o, uint32_t ref, uint32_t *part,
-                      double *settled)
+bool umb_detail_shows(const umb_asker *a, const umb_object *o, uint32_t *part,
+                      float *settled)
 {
     const umb_mesh *mesh = o->mesh;
     while (*part < mesh->part_count) {
@@ -128,9 +136,9 @@ bool umb_detail_shows(const umb_asker *a, const umb_object *o, uint32_t ref, uin
         if (leaf && leaf_middle_shows(a, o, p, settled)) {
             return true;
         }
-        bool shows = box_shows(a, o, ref, *part);
+        bool shows = box_shows(a, o, *part);
         if (shows && leaf) {
-            shows = leaf_shows(a, o, ref, p, settled);
+            shows = leaf_shows(a, o, p, settled);
             if (shows) {
                 return true;
             }

@@ -14,13 +14,16 @@ typedef struct umb_asker {
     umb_cull_stats *stats;
 } umb_asker;
 
+/* True if asking in detail can tell more than the object's bounds do. */
+bool umb_detail_helps(const umb_object *o);
+
 /* One question: all of an image, or the outline in it. */
-bool umb_detail_hidden(const umb_asker *a, uint32_t ref, const umb_image *image, const umb_outline *outline);
+bool umb_detail_hidden(const umb_asker *a, const umb_image *image, const umb_outline *outline);
 
 /* Walk the parts of an object that is its shape, from *part on to the first that may be seen, and
  * stay there: parts passed over are hidden and remain so. False if all are. *settled becomes the
- * greatest view depth, in view, of what may be seen: nothing drawn beyond it can hide that. The
+ * greatest W, in view, of what may be seen: nothing drawn beyond it can hide that. The
  * object's bounds have been asked about before. */
-bool umb_detail_shows(const umb_asker *a, const umb_object *o, uint32_t ref, uint32_t *part, double *settled);
+bool umb_detail_shows(const umb_asker *a, const umb_object *o, uint32_t *part, float *settled);
 
 #endif

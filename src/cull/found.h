@@ -6,7 +6,7 @@
 #include <stdint.h>
 
 typedef struct umb_found {
-    double key; /* least view depth of the object's box */
+    float key; /* least W of the object's box */
     uint32_t id;
     bool inside; /* its box is wholly inside the frustum */
 } umb_found;

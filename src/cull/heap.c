@@ -18,7 +18,7 @@ void umb_heap_free(umb_heap *h, const umb_allocator *a)
     memset(h, 0, sizeof *h);
 }
 
-void umb_heap_push(umb_heap *h, double key, uint32_t slot)
+void umb_heap_push(umb_heap *h, float key, uint32_t slot)
 {
     umb_heap_entry item = {key, h->slots[slot].ref, slot};
     size_t i = h->count++;

@@ -7,20 +7,20 @@
 #include "occlusion/method.h"
 
 typedef struct umb_waiting {
-    double nearest;  /* least view depth of its box: the key at first */
-    double settled;  /* objects: the view depth beyond which nothing drawn can hide what keeps it visible */
+    float nearest;   /* least W of its box (raster_map.h): the key at first */
+    float settled;   /* objects: the W beyond which nothing drawn can hide what keeps it visible */
     uint32_t ref;    /* index/tree.h */
     uint32_t stamp;  /* how many occluders had been drawn when it was last tested */
     umb_image image; /* meaningful if testable */
     uint32_t part;   /* objects: parts before this one are hidden */
     uint16_t planes; /* frustum planes that its box may cross */
-    bool testable;   /* beyond the near depth everywhere */
+    bool testable;   /* in front of the eye everywhere */
     bool waited;     /* objects: its turn has come before; now it waits until it is settled */
 } umb_waiting;
 
 /* What the heap moves about: its order, and where the rest is. */
 typedef struct umb_heap_entry {
-    double key; /* the view depth at which its turn comes */
+    float key; /* the W at which its turn comes */
     uint32_t ref;
     uint32_t slot;
 } umb_heap_entry;
@@ -69,7 +69,7 @@ static inline void umb_heap_give(umb_heap *h, uint32_t slot)
     h->free[h->free_count++] = slot;
 }
 
-void umb_heap_push(umb_heap *h, double key, uint32_t slot);
+void umb_heap_push(umb_heap *h, float key, uint32_t slot);
 /* Take the first entry out; its slot stays the caller's, to push again or give back. */
 umb_heap_entry umb_heap_pop(umb_heap *h);
 

@@ -5,30 +5,45 @@
 
 #include "frustum.h"
 
-/* The map of a raster: with d = p - eye, X = x.d, Y = y.d, W = w.d,
- *     perspective    pixel = (X / W + cx, Y / W + cy)
- *     orthographic   pixel = (X + cx, Y + cy)
- * These numbers are taken as they are: they define the map, so that only its evaluation has an error,
- * which the kernel bounds by itself. */
+/* The map of a raster: with d = p - eye, X = x.d, Y = y.d, W = w.d
+ *     perspective    image = (X / W + cx, Y / W + cy)
+ *     orthographic   image = (X + cx, Y + cy)
+ * and the row of a height y = slope y + extra clamp(y - from, 0, span), which the raster's own table is
+ * within slack rows of. Made from doubles, which define the map; the kernel bounds what floats lose. */
 typedef struct umb_projector {
-    double eye[3];
-    double x[3], y[3], w[3];
-    double cx, cy;
-    bool orthographic;
+    float eye_high[3], eye_low[3]; /* their sum is the eye, to 48 bits */
+    float x[3], y[3], w[3];
+    float cx, cy;
+    float size_x, size_y, size_w; /* largest absolute components of x, y, w */
+    float eye_size;               /* what the eye's own rounding is relative to, in units of a box's reach */
+    float slope, extra, from, span, slack;
+    float width, height; /* pixels */
+    int32_t vertical;    /* 0..2: x and w have no component along this axis and y no other one; -1: none */
+    int32_t orthographic;
 } umb_projector;
 
-/* Bounds of the image of each box: every point of the closed box has its true image and its true W
- * within them. Perspective: a box that reaches W <= 0, or comes so near to it that the bound of W's
- * rounding matters, has the range +-UMB_PROJECTED_ALL in x and y; w_min may be negative then. Boxes
- * with w_min > 0 and a smaller range lie in front of the eye. Nothing is infinite, nothing is
- * NaN. */
+/* The image of each box, outer: pixels that any point of it may touch, as far as they are on the raster,
+ * and depths that hold its W. The image is meaningful for boxes of the mask testable: those that lie in
+ * front of the eye by more than what rounding can do to W. Slots that are not have zeros. */
 typedef struct umb_projected {
-    double x_min[UMB_NODE_WIDTH], x_max[UMB_NODE_WIDTH];
-    double y_min[UMB_NODE_WIDTH], y_max[UMB_NODE_WIDTH];
-    double w_min[UMB_NODE_WIDTH], w_max[UMB_NODE_WIDTH];
+    int32_t x0[UMB_NODE_WIDTH], y0[UMB_NODE_WIDTH], x1[UMB_NODE_WIDTH], y1[UMB_NODE_WIDTH];
+    float nearness[UMB_NODE_WIDTH]; /* at least 1 / W, orthographic -W, of every point of the box */
+    float w_min[UMB_NODE_WIDTH], w_max[UMB_NODE_WIDTH];
+    uint32_t testable; /* a bit for each slot */
+    uint32_t beside;   /* testable, and no point of it is on the raster */
 } umb_projected;
 
-#define UMB_PROJECTED_ALL 1e30
+/* What a projector is made from. */
+typedef struct umb_projector_def {
+    const double *eye, *x, *y, *w; /* three each */
+    double cx, cy;
+    float slope, extra, from, span, slack;
+    uint32_t width, height;
+    int vertical;
+    bool orthographic;
+} umb_projector_def;
+
+void umb_projector_prepare(umb_projector *p, const umb_projector_def *def);
 
 typedef struct umb_box_kernels {
     umb_isa isa;

@@ -1,11 +1,12 @@
-/* The kernels, as loops over eight lanes without a branch: box_kernels_ISA.c includes this with
- * KERNELS defined and is compiled with that instruction set's flags. No lane depends on another,
- * sums run x, y, z, minima and maxima are (a < b ? a : b): so every build gives the same bits.
+/* The kernels, over eight lanes without a branch: box_kernels_ISA.c includes this with KERNELS defined
+ * and is compiled with that instruction set's flags. No lane depends on another, sums run x, y, z: so every
+ * build gives the same bits.
  *
  * Bounds: frustum.c for cull, below for project.
  */
 #include <math.h>
 
+#include "base/simd.h"
 #include "box_kernels.h"
 
 #define LANES UMB_NODE_WIDTH
@@ -100,174 +101,239 @@ static uint32_t cull(const umb_frustum *f, const umb_node *node, uint16_t planes
 
 /* ---- projection ----------------------------------------------------------------------------- */
 
-/* Let v = 2^-53, kx, ky, kw the largest absolute components of x, y, w, and D the sum over the axes of
- * the larger |d_i| of the box's faces.
+/* In floats, u = 2^-24. Let kx, ky, kw be the largest absolute components of x, y, w, D the sum over the
+ * axes of the larger |d_i| of the box's faces, and R = D + 2^-22 sum |e_i|.
  *
- *   d                one difference of doubles (faces and eye are exact)      v |d_i|
- *   X, Y, W          products v, sums 2 v                                     4 v k D each, with d's
+ *   d       e to two floats u^2 |e|, two differences u each              2 u |d_i| + u^2 |e_i|
+ *   X, Y, W coefficient u, product u, two sums u each, d's own           6 u k R each, 8 u with R's rounding
  *
- * The extremes of X and W over the box are at corners, and rounding is monotone, so the computed
- * ones are the sums of each axis' smaller or larger product. [w_min, w_max] is widened by 8 v kw D:
- * four for W, one for the widening's own rounding.
+ * The extremes of X and W over the box are at corners, and rounding is monotone: [w_min, w_max] is the
+ * computed one widened by 16 u kw R.
  *
- * Perspective. Let W' be the smallest computed W of the box; it is taken only if W' > 2^12 v kw D,
- * so that W is within 2^-10 of itself at each corner, positive on the box, and the image of the box
- * is the hull of the images of its corners. With q = X / W and Q the larger absolute value of the
- * computed extremes of q:
- *   q                |dX| / W + |q| |dW| / W                     4.1 v (D / W') (kx + kw Q)
- *   1 / W, times X   v each                                      2 v Q
- *   + cx, - margin   v each                                      2 v (Q + |cx|) and v margin
- * The margin is 8 v ((D / W') (kx + kw Q) + Q + |cx|) + 1e-200: nearly twice the sum, which pays for
- * the rounding of the margin (nine operations) and second order. The last term is for underflow: W'
- * is at least 1e-60, and an operation loses less than 1e-307 even where denormals are flushed.
+ * Perspective. Let W' be the smallest computed W; the box is testable only if W' > 2^-12 kw R, so that W is
+ * within 2^-9 of itself at each corner, positive on the box, and the image of the box is the hull of the
+ * images of its corners. With q = X / W and Q the larger absolute value of q's computed extremes:
+ *   q                |dX| / W + |q| |dW| / W                     8 u (1 + 2^-8) (R / W') (kx + kw Q)
+ *   1 / W, times X   u each                                      2 u Q
+ *   cx, sum, margin  u each                                      u (Q + 2 |cx|) + u margin
+ * The margin is 16 u (R / W') (kx + kw Q) + 8 u (Q + |cx|) + 2^-20, and 1 / W' stands in for R / W' with the
+ * largest computed reciprocal: nearly twice the sum, which pays for the rounding of the margin itself.
+ * nearness is the largest reciprocal, up by 16 u kw R / W' + 4 u of itself, twice the bound again.
  *
- * Orthographic: X has 4 v kx D, the sum with cx and the margin v (kx D + |cx|) each; the margin is
- * 8 v (kx D + |cx|) + 1e-200.
- */
-#define MARGIN 0x1p-50 /* 8 v */
-#define SAFE_W 0x1p-41 /* 2^12 v */
-#define LEAST_W 1e-60
-
-static inline double smaller(double a, double b)
-{
-    return a < b ? a : b;
-}
-
-static inline double larger(double a, double b)
-{
-    return a > b ? a : b;
-}
-
-static inline double largest_of(const double v[3])
-{
-    return larger(fabs(v[0]), larger(fabs(v[1]), fabs(v[2])));
-}
-
-/* d of a box's six faces: 0 the lower face of an axis, 1 the upper. Plain members, no arrays: what
- * the compilers see through when they turn the lane loops into vectors. */
-typedef struct faces {
-    double x0, x1, y0, y1, z0, z1;
-} faces;
-
-static inline faces faces_of(const umb_node *node, const umb_projector *p, int i)
-{
-    faces d = {node->min[0][i] - p->eye[0], node->max[0][i] - p->eye[0],
-               node->min[1][i] - p->eye[1], node->max[1][i] - p->eye[1],
-               node->min[2][i] - p->eye[2], node->max[2][i] - p->eye[2]};
-    return d;
-}
-
-static inline double reach_of(faces d)
-{
-    return (larger(fabs(d.x0), fabs(d.x1)) + larger(fabs(d.y0), fabs(d.y1))) +
-           larger(fabs(d.z0), fabs(d.z1));
-}
-
-/* The products of r.d at each face. */
-static inline faces multiply(const double r[3], faces d)
-{
-    faces p = {r[0] * d.x0, r[0] * d.x1, r[1] * d.y0, r[1] * d.y1, r[2] * d.z0, r[2] * d.z1};
-    return p;
-}
-
-static inline double least(faces p)
-{
-    return (smaller(p.x0, p.x1) + smaller(p.y0, p.y1)) + smaller(p.z0, p.z1);
-}
-
-static inline double greatest(faces p)
-{
-    return (larger(p.x0, p.x1) + larger(p.y0, p.y1)) + larger(p.z0, p.z1);
-}
-
-static void project_parallel(const umb_node *restrict node, const umb_projector *restrict p,
-                             umb_projected *restrict out)
-{
-    double kx = MARGIN * largest_of(p->x);
-    double ky = MARGIN * largest_of(p->y);
-    double kw = MARGIN * largest_of(p->w);
-    double bx = MARGIN * fabs(p->cx) + 1e-200;
-    double by = MARGIN * fabs(p->cy) + 1e-200;
-    LANE_LOOP
-    for (int i = 0; i < LANES; ++i) {
-        faces d = faces_of(node, p, i);
-        faces x = multiply(p->x, d);
-        faces y = multiply(p->y, d);
-        faces w = multiply(p->w, d);
-        double reach = reach_of(d);
-        double mx = kx * reach + bx;
-        double my = ky * reach + by;
-        out->x_min[i] = (least(x) + p->cx) - mx;
-        out->x_max[i] = (greatest(x) + p->cx) + mx;
-        out->y_min[i] = (least(y) + p->cy) - my;
-        out->y_max[i] = (greatest(y) + p->cy) + my;
-        out->w_min[i] = least(w) - kw * reach;
-        out->w_max[i] = greatest(w) + kw * reach;
-    }
-}
+ * Range. A testable box has R max(kx, ky, kw) < 1e37, so nothing overflows, and W' > 1e-27: an operation
+ * that underflows loses at most 2^-126, which is below 2^-36 of a pixel after the division.
+ *
+ * Orthographic: X as above; then the sum with cx and the margin: 16 u kx R + 8 u (|X| + |cx|) + 2^-20.
+ *
+ * Rows. A height within the raster has its row by a formula whose rounding is part of slack. */
+#define MARGIN_REACH 0x1p-20f
+#define MARGIN_IMAGE 0x1p-21f
+#define MARGIN_LEAST 0x1p-20f
+#define SAFE_W 0x1p-12f
+#define LEAST_W 1e-27f
+#define MOST_REACH 1e37f
 
 typedef struct extent {
-    double least, most;
+    umb_fv low, high;
 } extent;
 
-static inline extent extend(extent e, double v)
+static inline extent extent_of(umb_fv a, umb_fv b)
 {
-    extent r = {smaller(v, e.least), larger(v, e.most)};
+    extent e = {umb_fv_min(a, b), umb_fv_max(a, b)};
+    return e;
+}
+
+static inline extent extend(extent e, umb_fv v)
+{
+    extent r = {umb_fv_min(v, e.low), umb_fv_max(v, e.high)};
     return r;
 }
 
-/* Written out, not a loop: a loop over corners inside the loop over lanes is not made into
- * vectors. */
-#define EACH_CORNER(f) f(0, 0, 0) f(1, 0, 0) f(0, 1, 0) f(1, 1, 0) f(0, 0, 1) f(1, 0, 1) f(0, 1, 1) f(1, 1, 1)
-#define CORNER(p, a, b, c) (((p).x##a + (p).y##b) + (p).z##c)
-#define PROJECT_CORNER(a, b, c)                                                                    \
-    {                                                                                              \
-        double r = 1.0 / CORNER(w, a, b, c);                                                       \
-        ex = extend(ex, CORNER(x, a, b, c) * r);                                                   \
-        ey = extend(ey, CORNER(y, a, b, c) * r);                                                   \
-    }
+/* Faces relative to the eye. */
+typedef struct faces {
+    umb_fv low[3], high[3], reach;
+} faces;
 
-static void project_perspective(const umb_node *restrict node, const umb_projector *restrict p,
-                                umb_projected *restrict out)
+static inline faces faces_of(const umb_node *node, const umb_projector *p, int at)
 {
-    double kx = largest_of(p->x);
-    double ky = largest_of(p->y);
-    double kw = largest_of(p->w);
-    double bx = MARGIN * fabs(p->cx) + 1e-200;
-    double by = MARGIN * fabs(p->cy) + 1e-200;
-    LANE_LOOP
-    for (int i = 0; i < LANES; ++i) {
-        faces d = faces_of(node, p, i);
-        faces x = multiply(p->x, d);
-        faces y = multiply(p->y, d);
-        faces w = multiply(p->w, d);
-        double reach = reach_of(d);
-        double least_w = least(w);
-        double safe = larger(SAFE_W * (kw * reach), LEAST_W);
-        extent ex = {INFINITY, -INFINITY};
-        extent ey = {INFINITY, -INFINITY};
-        EACH_CORNER(PROJECT_CORNER)
-        double wide = MARGIN * (reach * (1.0 / least_w));
-        double size_x = larger(fabs(ex.least), fabs(ex.most));
-        double size_y = larger(fabs(ey.least), fabs(ey.most));
-        double mx = (wide * (kx + kw * size_x) + MARGIN * size_x) + bx;
-        double my = (wide * (ky + kw * size_y) + MARGIN * size_y) + by;
-        bool all = !(least_w > safe);
-        out->x_min[i] = all ? -UMB_PROJECTED_ALL : (ex.least + p->cx) - mx;
-        out->x_max[i] = all ? UMB_PROJECTED_ALL : (ex.most + p->cx) + mx;
-        out->y_min[i] = all ? -UMB_PROJECTED_ALL : (ey.least + p->cy) - my;
-        out->y_max[i] = all ? UMB_PROJECTED_ALL : (ey.most + p->cy) + my;
-        out->w_min[i] = least_w - MARGIN * (kw * reach);
-        out->w_max[i] = greatest(w) + MARGIN * (kw * reach);
+    faces f;
+    f.reach = umb_fv_set(p->eye_size);
+    for (int axis = 0; axis < 3; ++axis) {
+        f.low[axis] = (umb_fv_load(node->min[axis] + at) - p->eye_high[axis]) - p->eye_low[axis];
+        f.high[axis] = (umb_fv_load(node->max[axis] + at) - p->eye_high[axis]) - p->eye_low[axis];
+        f.reach += umb_fv_max(umb_fv_abs(f.low[axis]), umb_fv_abs(f.high[axis]));
     }
+    return f;
+}
+
+/* What all projections end with: pixels and depths. x, y, w: computed extremes; margins in pixels. */
+typedef struct bounds {
+    extent x, y, w;
+    umb_fv margin_x, margin_y, off_w, nearness;
+    umb_iv sane; /* nothing has overflowed */
+    umb_iv testable;
+} bounds;
+
+static inline umb_fv row_of(const umb_projector *p, umb_fv y)
+{
+    umb_fv zero = umb_fv_set(0.0f);
+    y = umb_fv_clamp(y, zero, umb_fv_set(p->height));
+    return p->slope * y + p->extra * umb_fv_clamp(y - p->from, zero, umb_fv_set(p->span));
+}
+
+static inline void finish(const umb_projector *p, const bounds *b, int at, umb_projected *out)
+{
+    umb_fv zero = umb_fv_set(0.0f);
+    umb_fv last_x = umb_fv_set(p->width - 1.0f);
+    umb_fv last_y = umb_fv_set(p->height - 1.0f);
+    umb_fv left = (b->x.low + p->cx) - b->margin_x;
+    umb_fv right = (b->x.high + p->cx) + b->margin_x;
+    umb_fv top = (b->y.low + p->cy) - b->margin_y;
+    umb_fv bottom = (b->y.high + p->cy) + b->margin_y;
+    umb_iv beside = (right < zero) | (left > p->width) | (bottom < zero) | (top > p->height);
+    /* Slots that are not testable may hold anything, NaN too. */
+    umb_iv ok = b->testable;
+    left = umb_fv_select(ok, umb_fv_clamp(left, zero, last_x), zero);
+    right = umb_fv_select(ok, umb_fv_clamp(right, zero, last_x), zero);
+    top = umb_fv_select(ok, umb_fv_clamp(row_of(p, top) - p->slack, zero, last_y), zero);
+    bottom = umb_fv_select(ok, umb_fv_clamp(row_of(p, bottom) + p->slack, zero, last_y), zero);
+    umb_iv_store(out->x0 + at, umb_fv_trunc(left));
+    umb_iv_store(out->x1 + at, umb_fv_trunc(right));
+    umb_iv_store(out->y0 + at, umb_fv_trunc(top));
+    umb_iv_store(out->y1 + at, umb_fv_trunc(bottom));
+    umb_fv_store(out->nearness + at, umb_fv_select(ok, b->nearness, zero));
+    umb_fv huge = umb_fv_set(INFINITY);
+    umb_fv_store(out->w_min + at, umb_fv_select(b->sane, b->w.low - b->off_w, -huge));
+    umb_fv_store(out->w_max + at, umb_fv_select(b->sane, b->w.high + b->off_w, huge));
+    out->testable |= umb_iv_bits(ok) << at;
+    out->beside |= umb_iv_bits(ok & beside) << at;
+}
+
+/* The smaller and larger of r.d over the box: the sum of each axis' smaller and larger product. */
+static inline extent extremes_of(const float r[3], const faces *d)
+{
+    extent x = extent_of(r[0] * d->low[0], r[0] * d->high[0]);
+    extent y = extent_of(r[1] * d->low[1], r[1] * d->high[1]);
+    extent z = extent_of(r[2] * d->low[2], r[2] * d->high[2]);
+    extent e = {(x.low + y.low) + z.low, (x.high + y.high) + z.high};
+    return e;
+}
+
+static inline void project_parallel(const umb_node *node, const umb_projector *p, int at, umb_projected *out)
+{
+    faces d = faces_of(node, p, at);
+    bounds b;
+    b.x = extremes_of(p->x, &d);
+    b.y = extremes_of(p->y, &d);
+    b.w = extremes_of(p->w, &d);
+    float size = p->size_x > p->size_y ? p->size_x : p->size_y;
+    size = size > p->size_w ? size : p->size_w;
+    umb_fv size_x = umb_fv_max(umb_fv_abs(b.x.low), umb_fv_abs(b.x.high));
+    umb_fv size_y = umb_fv_max(umb_fv_abs(b.y.low), umb_fv_abs(b.y.high));
+    b.margin_x = (MARGIN_REACH * p->size_x) * d.reach +
+                 (MARGIN_IMAGE * (size_x + (p->cx < 0.0f ? -p->cx : p->cx)) + MARGIN_LEAST);
+    b.margin_y = (MARGIN_REACH * p->size_y) * d.reach +
+                 (MARGIN_IMAGE * (size_y + (p->cy < 0.0f ? -p->cy : p->cy)) + MARGIN_LEAST);
+    b.off_w = (MARGIN_REACH * p->size_w) * d.reach;
+    b.sane = b.testable = d.reach * size < MOST_REACH;
+    umb_fv z = b.off_w - b.w.low;
+    b.nearness = z + 0x1p-22f * umb_fv_abs(z);
+    finish(p, &b, at, out);
+}
+
+/* Bounds from the extremes of X / W, Y / W, W and the largest reciprocal. */
+static inline void finish_perspective(const umb_projector *p, const faces *d, bounds *b, umb_fv most,
+                                      int at, umb_projected *out)
+{
+    umb_fv size_x = umb_fv_max(umb_fv_abs(b->x.low), umb_fv_abs(b->x.high));
+    umb_fv size_y = umb_fv_max(umb_fv_abs(b->y.low), umb_fv_abs(b->y.high));
+    umb_fv wide = MARGIN_REACH * (d->reach * most);
+    b->margin_x = wide * (p->size_x + p->size_w * size_x) +
+                  (MARGIN_IMAGE * (size_x + (p->cx < 0.0f ? -p->cx : p->cx)) + MARGIN_LEAST);
+    b->margin_y = wide * (p->size_y + p->size_w * size_y) +
+                  (MARGIN_IMAGE * (size_y + (p->cy < 0.0f ? -p->cy : p->cy)) + MARGIN_LEAST);
+    b->off_w = (MARGIN_REACH * p->size_w) * d->reach;
+    float size = p->size_x > p->size_y ? p->size_x : p->size_y;
+    size = size > p->size_w ? size : p->size_w;
+    b->sane = d->reach * size < MOST_REACH;
+    b->testable = b->sane & (b->w.low > (SAFE_W * p->size_w) * d->reach) & (b->w.low > LEAST_W);
+    b->nearness = most + most * (wide * p->size_w + 0x1p-22f);
+    finish(p, b, at, out);
+}
+
+/* X and W do not depend on the vertical v: a box has four upright edges, and each is a column. s and t are the
+ * other axes. */
+static inline void project_upright(const umb_node *node, const umb_projector *p, int v, int s, int t, int at,
+                                   umb_projected *out)
+{
+    faces d = faces_of(node, p, at);
+    umb_fv x0 = p->x[s] * d.low[s], x1 = p->x[s] * d.high[s];
+    umb_fv x2 = p->x[t] * d.low[t], x3 = p->x[t] * d.high[t];
+    umb_fv w0 = p->w[s] * d.low[s], w1 = p->w[s] * d.high[s];
+    umb_fv w2 = p->w[t] * d.low[t], w3 = p->w[t] * d.high[t];
+    bounds b;
+    b.w.low = umb_fv_min(w0, w1) + umb_fv_min(w2, w3);
+    b.w.high = umb_fv_max(w0, w1) + umb_fv_max(w2, w3);
+    umb_fv one = umb_fv_set(1.0f);
+    umb_fv r0 = one / (w0 + w2), r1 = one / (w1 + w2), r2 = one / (w0 + w3), r3 = one / (w1 + w3);
+    b.x = extent_of((x0 + x2) * r0, (x1 + x2) * r1);
+    b.x = extend(extend(b.x, (x0 + x3) * r2), (x1 + x3) * r3);
+    extent r = extend(extend(extent_of(r0, r1), r2), r3);
+    extent y = extent_of(p->y[v] * d.low[v], p->y[v] * d.high[v]);
+    umb_fv zero = umb_fv_set(0.0f);
+    b.y.low = y.low * umb_fv_select(y.low < zero, r.high, r.low);
+    b.y.high = y.high * umb_fv_select(y.high > zero, r.high, r.low);
+    finish_perspective(p, &d, &b, r.high, at, out);
+}
+
+static inline void project_perspective(const umb_node *node, const umb_projector *p, int at,
+                                       umb_projected *out)
+{
+    faces d = faces_of(node, p, at);
+    umb_fv x[3][2], y[3][2], w[3][2];
+    for (int axis = 0; axis < 3; ++axis) {
+        x[axis][0] = p->x[axis] * d.low[axis];
+        x[axis][1] = p->x[axis] * d.high[axis];
+        y[axis][0] = p->y[axis] * d.low[axis];
+        y[axis][1] = p->y[axis] * d.high[axis];
+        w[axis][0] = p->w[axis] * d.low[axis];
+        w[axis][1] = p->w[axis] * d.high[axis];
+    }
+    bounds b;
+    b.w.low = (umb_fv_min(w[0][0], w[0][1]) + umb_fv_min(w[1][0], w[1][1])) + umb_fv_min(w[2][0], w[2][1]);
+    b.w.high = (umb_fv_max(w[0][0], w[0][1]) + umb_fv_max(w[1][0], w[1][1])) + umb_fv_max(w[2][0], w[2][1]);
+    umb_fv huge = umb_fv_set(INFINITY);
+    extent none = {huge, -huge};
+    b.x = b.y = none;
+    umb_fv one = umb_fv_set(1.0f);
+    umb_fv most = umb_fv_set(0.0f);
+    for (int k = 0; k < 8; ++k) {
+        int i = k & 1;
+        int j = k >> 1 & 1;
+        int l = k >> 2;
+        umb_fv r = one / ((w[0][i] + w[1][j]) + w[2][l]);
+        b.x = extend(b.x, ((x[0][i] + x[1][j]) + x[2][l]) * r);
+        b.y = extend(b.y, ((y[0][i] + y[1][j]) + y[2][l]) * r);
+        most = umb_fv_max(r, most);
+    }
+    finish_perspective(p, &d, &b, most, at, out);
 }
 
 static void project(const umb_node *node, const umb_projector *p, umb_projected *out)
 {
-    if (p->orthographic) {
-        project_parallel(node, p, out);
-    } else {
-        project_perspective(node, p, out);
+    out->testable = out->beside = 0;
+    for (int at = 0; at < 8; at += UMB_LANES) {
+        if (p->orthographic != 0) {
+            project_parallel(node, p, at, out);
+        } else if (p->vertical == 0) {
+            project_upright(node, p, 0, 1, 2, at, out);
+        } else if (p->vertical == 1) {
+            project_upright(node, p, 1, 0, 2, at, out);
+        } else if (p->vertical == 2) {
+            project_upright(node, p, 2, 0, 1, at, out);
+        } else {
+            project_perspective(node, p, at, out);
+        }
     }
 }
 

@@ -84,6 +84,11 @@ static const char *check_depths(const umb_view *view)
 
 static const char *check_extras(const umb_view *view)
 {
+    const double *v = view->vertical;
+    double size = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
+    if (!all_finite(v, 3) || (size > 0.0 && size < 1.0 / LARGEST)) {
+        return "vertical must be finite, and zero or not next to zero";
+    }
     if ((view->width == 0) != (view->height == 0) ||
         (view->buffer_width == 0) != (view->buffer_height == 0)) {
         return "a picture's width and height are both given or both zero";
@@ -175,6 +180,7 @@ static bool aim(umb_view *v, const double eye[3], const double target[3], const 
     store(v->forward, f);
     store(v->right, r);
     store(v->up, upright);
+    store(v->vertical, u);
     return true;
 }
 

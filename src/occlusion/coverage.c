@@ -57,56 +57,13 @@ void umb_coverage_clear(umb_coverage *c)
     }
 }
 
-/* Rows r0..r1 and the columns of need, all within one tile. */
-static bool tile_hides(const umb_tile *tile, uint32_t r0, uint32_t r1, uint32_t need, float nearness)
-{
-    uint32_t open = 0;
-    for (uint32_t r = r0; r <= r1; ++r) {
-        open |= need & ~tile->mask[r];
-    }
-    if (open != 0) {
-        return false;
-    }
-    for (uint32_t half = r0 / 4; half <= r1 / 4; ++half) {
-        for (uint32_t s = 0; s < 4; ++s) {
-            if ((need >> (8 * s) & 0xFFu) != 0 && tile->z[4 * half + s] < nearness) {
-                return false;
-            }
-        }
-    }
-    return true;
-}
-
-bool umb_coverage_hides(const umb_coverage *c, umb_pixel_rect rect, float nearness)
-{
-    uint32_t tx0 = (uint32_t)rect.x0 / UMB_TILE_WIDTH, tx1 = (uint32_t)rect.x1 / UMB_TILE_WIDTH;
-    uint32_t ty0 = (uint32_t)rect.y0 / UMB_TILE_HEIGHT, ty1 = (uint32_t)rect.y1 / UMB_TILE_HEIGHT;
-    uint32_t first = ~0u << ((uint32_t)rect.x0 % UMB_TILE_WIDTH);
-    uint32_t last = ~0u >> (UMB_TILE_WIDTH - 1 - (uint32_t)rect.x1 % UMB_TILE_WIDTH);
-    for (uint32_t ty = ty0; ty <= ty1; ++ty) {
-        uint32_t r0 = ty == ty0 ? (uint32_t)rect.y0 % UMB_TILE_HEIGHT : 0;
-        uint32_t r1 = ty == ty1 ? (uint32_t)rect.y1 % UMB_TILE_HEIGHT : UMB_TILE_HEIGHT - 1;
-        for (uint32_t tx = tx0; tx <= tx1; ++tx) {
-            size_t t = (size_t)ty * c->columns + tx;
-            if (c->coarse[t] >= nearness) {
-                continue;
-            }
-            uint32_t need = (tx == tx0 ? first : ~0u) & (tx == tx1 ? last : ~0u);
-            if (!tile_hides(&c->tiles[t], r0, r1, need, nearness)) {
-                return false;
-            }
-        }
-    }
-    return true;
-}
-
 /* Columns that an outline enters in a row, [*first, *last]; false if none. The row's closed band
  * and the outline are grown by the error; interpolating adds fewer than 16 units of the
  * coordinates. */
-static bool outline_span(const umb_outline *o, uint32_t row, uint32_t width, uint32_t *first,
+static bool outline_span(const umb_outline *o, const double *edge, uint32_t width, uint32_t *first,
                          uint32_t *last)
 {
-    double low = INFINITY, high = -INFINITY, y0 = row - o->error, y1 = row + 1.0 + o->error;
+    double low = INFINITY, high = -INFINITY, y0 = edge[0] - o->error, y1 = edge[1] + o->error;
     for (uint32_t i = 0; i < o->count; ++i) {
         uint32_t k = i + 1 < o->count ? i + 1 : 0;
         double px = o->x[i], py = o->y[i], qx = o->x[k], qy = o->y[k];
@@ -141,18 +98,17 @@ static bool outline_span(const umb_outline *o, uint32_t row, uint32_t width, uin
     return true;
 }
 
-/* Most nearness of an outline over the sub-tile at (x, y), up by what covers the plane's relative
- * 2^-22. */
-static double outline_nearness(const umb_outline *o, double x, double y)
+/* Most nearness of an outline over eight columns from x on, between two heights, up by what covers the
+ * plane's relative 2^-22. */
+static double outline_nearness(const umb_outline *o, double x, double y0, double y1)
 {
-    double z = o->g0 + (o->gx * x + (o->gx > 0.0 ? o->gx * 8.0 : 0.0)) +
-               (o->gy * y + (o->gy > 0.0 ? o->gy * 4.0 : 0.0));
+    double z = o->g0 + (o->gx * x + (o->gx > 0.0 ? o->gx * 8.0 : 0.0)) + o->gy * (o->gy > 0.0 ? y1 : y0);
     z += 0x1p-21 * fabs(z);
     return z < o->most ? z : o->most;
 }
 
-static bool outline_row_hidden(const umb_coverage *c, const umb_outline *o, uint32_t row,
-                               uint32_t first, uint32_t last)
+static bool outline_row_hidden(const umb_coverage *c, const umb_outline *o, const double *edge,
+                               uint32_t row, uint32_t first, uint32_t last)
 {
     const umb_tile *tiles = c->tiles + (size_t)(row / UMB_TILE_HEIGHT) * c->columns;
     uint32_t r = row % UMB_TILE_HEIGHT, half = r / 4;
@@ -166,7 +122,7 @@ static bool outline_row_hidden(const umb_coverage *c, const umb_outline *o, uint
         for (uint32_t s = 0; s < 4; ++s) {
             float z = tiles[tx].z[4 * half + s];
             if ((need >> (8 * s) & 0xFFu) != 0 && z < o->most &&
-                z < outline_nearness(o, x + 8.0 * s, row - r % 4)) {
+                z < outline_nearness(o, x + 8.0 * s, edge[row], edge[row + 1])) {
                 return false;
             }
         }
@@ -174,49 +130,15 @@ static bool outline_row_hidden(const umb_coverage *c, const umb_outline *o, uint
     return true;
 }
 
-bool umb_coverage_hides_outline(const umb_coverage *c, umb_pixel_rect rect,
+bool umb_coverage_hides_outline(const umb_coverage *c, const double *edge, umb_pixel_rect rect,
                                 const umb_outline *outline)
 {
     for (int row = rect.y0; row <= rect.y1; ++row) {
         uint32_t first, last;
-        if (outline_span(outline, (uint32_t)row, c->width, &first, &last) &&
-            !outline_row_hidden(c, outline, (uint32_t)row, first, last)) {
+        if (outline_span(outline, edge + row, c->width, &first, &last) &&
+            !outline_row_hidden(c, outline, edge, (uint32_t)row, first, last)) {
             return false;
         }
     }
     return true;
-}
-
-void umb_coverage_merge(umb_coverage *c, uint32_t tile, const uint32_t mask[UMB_TILE_HEIGHT],
-                        const float z[8])
-{
-    umb_tile *t = &c->tiles[tile];
-    uint32_t fresh[2] = {0, 0},
-             lone[2] = {0, 0}; /* bits that only mask has; bits that only the tile has */
-    uint32_t all = ~0u;
-    for (uint32_t r = 0; r < UMB_TILE_HEIGHT; ++r) {
-        fresh[r / 4] |= mask[r] & ~t->mask[r];
-        lone[r / 4] |= t->mask[r] & ~mask[r];
-        t->mask[r] |= mask[r];
-        all &= t->mask[r];
-    }
-    for (uint32_t s = 0; s < 8; ++s) {
-        uint32_t byte = 0xFFu << (8 * (s % 4));
-        bool has_fresh = (fresh[s / 4] & byte) != 0;
-        bool has_lone = (lone[s / 4] & byte) != 0;
-        if (!has_lone && (has_fresh || z[s] > t->z[s])) {
-            /* The occluder alone covers all that is covered here, or there was nothing: without new bits
-               it does so from nearer. */
-            t->z[s] = z[s];
-        } else if (has_fresh && z[s] < t->z[s]) {
-            t->z[s] = z[s];
-        }
-    }
-    if (all == ~0u) {
-        float least = t->z[0];
-        for (uint32_t s = 1; s < 8; ++s) {
-            least = t->z[s] < least ? t->z[s] : least;
-        }
-        c->coarse[tile] = least;
-    }
 }

@@ -54,15 +54,9 @@ bool umb_coverage_resize(umb_coverage *c, const umb_allocator *a, uint32_t width
 void umb_coverage_free(umb_coverage *c, const umb_allocator *a);
 void umb_coverage_clear(umb_coverage *c);
 
-/* True if every pixel of rect is covered by something nearer than nearness. */
-bool umb_coverage_hides(const umb_coverage *c, umb_pixel_rect rect, float nearness);
-
-/* The same for the pixels of rect that an outline enters, against its own nearness. */
-bool umb_coverage_hides_outline(const umb_coverage *c, umb_pixel_rect rect, const umb_outline *outline);
-
-/* Add one occluder's pixels of one tile: mask as above, z a lower bound of its nearness for each
- * sub-tile with a bit. Keeps the invariant whatever the order of calls. */
-void umb_coverage_merge(umb_coverage *c, uint32_t tile, const uint32_t mask[UMB_TILE_HEIGHT],
-                        const float z[8]);
+/* True if every pixel of rect that an outline enters is covered by something nearer than the outline there.
+ * edge: heights of the rows' boundaries (raster_map.h). Rectangles as such: raster_kernels.h. */
+bool umb_coverage_hides_outline(const umb_coverage *c, const double *edge, umb_pixel_rect rect,
+                                const umb_outline *outline);
 
 #endif

@@ -34,8 +34,10 @@ void umb_fill_free(umb_fill *f, const umb_allocator *a)
     memset(f, 0, sizeof *f);
 }
 
-void umb_fill_begin(umb_fill *f, uint32_t x0, uint32_t y0, uint32_t x1, uint32_t y1)
+void umb_fill_begin(umb_fill *f, const umb_raster_map *map, uint32_t x0, uint32_t y0, uint32_t x1,
+                    uint32_t y1)
 {
+    f->map = map;
     f->row0 = y0;
     f->row1 = y1;
     f->word0 = x0 / 32;
@@ -119,45 +121,47 @@ static steep_edge order_edge(const umb_outline_edge *e)
 /* A row that an end of the edge may lie in. */
 static void end_row(umb_fill *f, const steep_edge *s, uint32_t r)
 {
+    double top = f->map->rows.edge[r], bottom = f->map->rows.edge[r + 1];
     double low = s->x_min, high = s->x_max;
     if (!s->flat) {
-        double ya = clamp(r - s->error, s->y_min, s->y_max),
-               yb = clamp(r + 1 + s->error, s->y_min, s->y_max);
+        double ya = clamp(top - s->error, s->y_min, s->y_max),
+               yb = clamp(bottom + s->error, s->y_min, s->y_max);
         double xa = s->x_top + (ya - s->y_min) * s->slope,
                xb = s->x_top + (yb - s->y_min) * s->slope;
         low = clamp(xa < xb ? xa : xb, s->x_min, s->x_max);
         high = clamp(xa < xb ? xb : xa, s->x_min, s->x_max);
     }
     touch(f, r, low - s->error, high + s->error);
-    double centre = r + 0.5;
-    if (s->y_min <= centre && centre < s->y_max) {
-        cross(f, r, clamp(s->x_top + (centre - s->y_min) * s->slope, s->x_min, s->x_max), s->count);
+    double middle = 0.5 * (top + bottom);
+    if (s->y_min <= middle && middle < s->y_max) {
+        cross(f, r, clamp(s->x_top + (middle - s->y_min) * s->slope, s->x_min, s->x_max), s->count);
     }
 }
 
 void umb_fill_edge(umb_fill *f, const umb_outline_edge *e)
 {
     steep_edge s = order_edge(e);
-    int32_t row0 = (int32_t)f->row0, row1 = (int32_t)f->row1;
-    int32_t r0 = umb_pixel_floor(s.y_min - s.error - UMB_PIXEL_SLACK);
-    int32_t r1 = umb_pixel_floor(s.y_max + s.error + UMB_PIXEL_SLACK);
-    if (r0 > row1 || r1 < row0) {
+    const umb_raster_rows *rows = &f->map->rows;
+    const double *edge = rows->edge;
+    if (s.y_max + s.error < edge[f->row0] || s.y_min - s.error > edge[f->row1 + 1]) {
         return;
     }
-    uint32_t first = (uint32_t)(r0 < row0 ? row0 : r0), last = (uint32_t)(r1 > row1 ? row1 : r1);
-    /* Rows that lie wholly between the ends, grown by the error, need no cutting at the ends:
-     *   x over [r - error, r + 1 + error] runs from x(r) - |slope| error to x(r) + slope + |slope| error. */
+    uint32_t r0 = (uint32_t)umb_raster_map_row_at(f->map, s.y_min - s.error, -rows->slack);
+    uint32_t r1 = (uint32_t)umb_raster_map_row_at(f->map, s.y_max + s.error, rows->slack);
+    uint32_t first = r0 < f->row0 ? f->row0 : r0, last = r1 > f->row1 ? f->row1 : r1;
+    /* Rows that lie wholly between the ends, grown by the error, need no cutting at the ends: x over
+     * [top - error, bottom + error] runs from x(top) - |slope| error to x(bottom) + |slope| error, or the other
+     * way round. */
     double grown = fabs(s.slope) * s.error + s.error;
-    double left = (s.slope < 0.0 ? s.slope : 0.0) - grown,
-           right = (s.slope > 0.0 ? s.slope : 0.0) + grown;
     for (uint32_t r = first; r <= last; ++r) {
-        if (s.flat || r - s.error < s.y_min || r + 1 + s.error > s.y_max) {
+        double top = edge[r], bottom = edge[r + 1];
+        if (s.flat || top - s.error < s.y_min || bottom + s.error > s.y_max) {
             end_row(f, &s, r);
             continue;
         }
-        double x = s.x_top + (r - s.y_min) * s.slope;
-        touch(f, r, x + left, x + right);
-        cross(f, r, x + 0.5 * s.slope, s.count);
+        double x = s.x_top + (top - s.y_min) * s.slope, along = (bottom - top) * s.slope;
+        touch(f, r, x + (along < 0.0 ? along : 0.0) - grown, x + (along > 0.0 ? along : 0.0) + grown);
+        cross(f, r, x + 0.5 * along, s.count);
     }
 }
 

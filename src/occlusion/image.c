@@ -9,15 +9,13 @@ umb_image umb_image_of_bounds(const umb_raster_map *map, const umb_image_bounds 
     if (!(b->x_max >= 0.0 && b->y_max >= 0.0 && b->x_min <= map->width && b->y_min <= map->height)) {
         return image;
     }
-    int32_t x_last = (int32_t)map->width - 1, y_last = (int32_t)map->height - 1;
+    int32_t x_last = (int32_t)map->width - 1;
     int32_t x0 = umb_pixel_floor(b->x_min - UMB_PIXEL_SLACK),
             x1 = umb_pixel_floor(b->x_max + UMB_PIXEL_SLACK);
-    int32_t y0 = umb_pixel_floor(b->y_min - UMB_PIXEL_SLACK),
-            y1 = umb_pixel_floor(b->y_max + UMB_PIXEL_SLACK);
+    int32_t y0 = umb_raster_map_row_at(map, b->y_min, -map->rows.slack),
+            y1 = umb_raster_map_row_at(map, b->y_max, map->rows.slack);
     x0 = x0 < 0 ? 0 : x0 > x_last ? x_last : x0;
-    y0 = y0 < 0 ? 0 : y0 > y_last ? y_last : y0;
     x1 = x1 < x0 ? x0 : x1 > x_last ? x_last : x1;
-    y1 = y1 < y0 ? y0 : y1 > y_last ? y_last : y1;
     image.rect.x0 = (int16_t)x0;
     image.rect.y0 = (int16_t)y0;
     image.rect.x1 = (int16_t)x1;
@@ -106,9 +104,9 @@ static double side_value(const umb_raster_map *m, int side, const umb_view_point
     double one = m->orthographic ? 1.0 : v->w;
     switch (side) {
     case 0:
-        return v->w - m->near_depth;
+        return v->w - m->least_w;
     case 1:
-        return m->far_depth - v->w;
+        return m->most_w - v->w;
     case 2:
         return v->x + m->cx * one;
     case 3:
@@ -125,7 +123,7 @@ static double side_value(const umb_raster_map *m, int side, const umb_view_point
 static double side_slack(const umb_raster_map *m, int side, double reach)
 {
     if (side < 2) {
-        return 64.0 * UMB_U * (reach + fabs(m->near_depth) + (side == 1 ? m->far_depth : 0.0));
+        return 64.0 * UMB_U * (reach + fabs(m->least_w) + (side == 1 ? fabs(m->most_w) : 0.0));
     }
     double across = fabs(m->cx) + fabs(m->cy) + m->width + m->height;
     return 64.0 * UMB_U * (m->scale * reach + across * (m->orthographic ? 1.0 : reach));
@@ -159,11 +157,11 @@ umb_depth_place umb_image_of_part(const umb_raster_map *map, const umb_aabb *par
     double off = 16.0 * UMB_U * box.reach + 3.0 * box.slop;
     out->w_min = box.middle.w - deep - off;
     out->w_max = box.middle.w + deep + off;
-    if (out->w_max < map->near_depth || out->w_min > map->far_depth) {
+    if (out->w_max < map->least_w || out->w_min > map->most_w) {
         return UMB_DEPTH_OUTSIDE;
     }
     /* The bound of a projected corner holds while W's own error is a small part of W. */
-    if (!(out->w_min >= map->near_depth) || (!map->orthographic && !(out->w_min > 4.0 * off))) {
+    if (!(out->w_min >= map->least_w) || (!map->orthographic && !(out->w_min > 4.0 * off))) {
         return box_beside(map, &box) ? UMB_DEPTH_OUTSIDE : UMB_DEPTH_CROSSING;
     }
     out->x_min = out->y_min = INFINITY;
@@ -226,7 +224,7 @@ umb_depth_place umb_outline_of_triangle(const umb_raster_map *map, const float c
     }
     int count = 3, now = 0;
     for (int side = 0; side < SIDES && count > 0; ++side) {
-        if (side == 1 && isinf(map->far_depth)) {
+        if (side == 1 && isinf(map->most_w)) {
             continue;
         }
         count = cut_polygon(map, side, side_slack(map, side, reach), polygon[now], count,

@@ -1,16 +1,18 @@
 /* The one interface of occlusion methods. A culler drives a method through a frame:
  *
  *   prepare      the view and the committed scene; forget last frame's occluders
- *   submit       ask about boxes; const, so that batches may be asked from several threads
+ *   hides        ask about a node's boxes; const, so that batches may be asked from several threads
+ *   hidden       ask about one box, or one triangle in it
  *   occlude      add one occluder that the walk has reached
  *
- * Queries carry the box's image on the raster, which the walk computes for its order anyway, and
- * the box's reference in the tree. A verdict HIDDEN is a promise; anything else is none.
+ * Questions carry the box's image on the raster, which the walk computes for its order anyway. That
+ * something is hidden is a promise; anything else is none.
  */
 #ifndef UMB_METHOD_H
 #define UMB_METHOD_H
 
 #include "coverage.h"
+#include "frustum/box_kernels.h"
 #include "raster_map.h"
 #include "scene/scene.h"
 #include "umbrage/cull.h"
@@ -21,24 +23,17 @@ typedef struct umb_image {
     float nearness;      /* of its nearest point, rounded towards the eye */
 } umb_image;
 
-typedef struct umb_query {
-    umb_image image;
-    const umb_outline *outline; /* the box holds one triangle, this one; NULL: use all of the image */
-    uint32_t ref; /* as in index/tree.h */
-} umb_query;
-
-typedef enum umb_verdict {
-    UMB_VERDICT_HIDDEN,
-    UMB_VERDICT_VISIBLE
-} umb_verdict;
-
 typedef struct umb_method_ops {
     const char *name;
     umb_class class_;
-    umb_result (*create)(const umb_allocator *allocator, void **state);
+    /* isa is one that is available. */
+    umb_result (*create)(const umb_allocator *allocator, umb_isa isa, void **state);
     void (*destroy)(void *state);
     umb_result (*prepare)(void *state, const umb_raster_map *map, const umb_committed *scene);
-    void (*submit)(const void *state, const umb_query *queries, uint32_t count, umb_verdict *verdicts);
+    /* A bit for each box of mask that is hidden; all of them are testable and not beside the raster. */
+    uint32_t (*hides)(const void *state, const umb_projected *boxes, uint32_t mask);
+    /* outline: the box holds one triangle, this one; NULL: use all of the image. */
+    bool (*hidden)(const void *state, const umb_image *image, const umb_outline *outline);
     /* True if something of this nearness at a raster point would surely not be found hidden: a cheap first
        question, whose answer false says nothing. */
     bool (*open_at)(const void *state, double x, double y, double nearness);

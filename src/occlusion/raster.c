@@ -7,6 +7,7 @@
 #include "base/memory.h"
 #include "fill.h"
 #include "method.h"
+#include "raster_kernels.h"
 #include "silhouette.h"
 
 /* One tile of the occluder being drawn. */
@@ -18,25 +19,28 @@ typedef struct window_tile {
 
 typedef struct raster {
     umb_allocator allocator;
+    const umb_raster_kernels *kernels;
     umb_raster_map map;
     const umb_committed *scene;
     uint64_t structure; /* of the scene that the scratch was sized for; 0: none */
     umb_coverage coverage;
     umb_fill fill;
     umb_silhouette silhouette;
+    umb_convex convex;
     window_tile *window; /* one per tile of the buffer; masks all zero between draws */
     uint8_t *wanted;     /* per tile: the sub-tiles that the occluder changes, a bit each */
     uint32_t *row;       /* one row of covered words */
     size_t window_capacity, wanted_capacity, row_capacity;
 } raster;
 
-static umb_result create(const umb_allocator *allocator, void **state)
+static umb_result create(const umb_allocator *allocator, umb_isa isa, void **state)
 {
     raster *r = umb_memory_allocate_zero(allocator, 1, sizeof *r);
     if (r == NULL) {
         return UMB_ERROR_MEMORY;
     }
     r->allocator = *allocator;
+    r->kernels = umb_raster_kernels_get(isa);
     *state = r;
     return UMB_OK;
 }
@@ -101,18 +105,19 @@ static umb_result prepare(void *state, const umb_raster_map *map, const umb_comm
     return UMB_OK;
 }
 
-static void submit(const void *state, const umb_query *queries, uint32_t count,
-                   umb_verdict *verdicts)
+static uint32_t hides(const void *state, const umb_projected *boxes, uint32_t mask)
 {
     const raster *r = state;
-    for (uint32_t i = 0; i < count; ++i) {
-        const umb_image *image = &queries[i].image;
-        bool hidden = image->rect.x0 > image->rect.x1 ||
-                      umb_coverage_hides(&r->coverage, image->rect, image->nearness) ||
-                      (queries[i].outline != NULL &&
-                       umb_coverage_hides_outline(&r->coverage, image->rect, queries[i].outline));
-        verdicts[i] = hidden ? UMB_VERDICT_HIDDEN : UMB_VERDICT_VISIBLE;
-    }
+    return r->kernels->hides(&r->coverage, boxes, mask);
+}
+
+static bool hidden(const void *state, const umb_image *image, const umb_outline *outline)
+{
+    const raster *r = state;
+    return image->rect.x0 > image->rect.x1 ||
+           r->kernels->hides_rect(&r->coverage, image->rect, image->nearness) ||
+           (outline != NULL &&
+            umb_coverage_hides_outline(&r->coverage, r->map.rows.edge, image->rect, outline));
 }
 
 static bool open_at(const void *state, double x, double y, double nearness)
@@ -121,7 +126,7 @@ static bool open_at(const void *state, double x, double y, double nearness)
     if (!(x >= 0.0 && y >= 0.0 && x < c->width && y < c->height)) {
         return false;
     }
-    uint32_t column = (uint32_t)x, row = (uint32_t)y;
+    uint32_t column = (uint32_t)x, row = (uint32_t)umb_raster_map_row_at(&((const raster *)state)->map, y, 0.0);
     const umb_tile
         *t = &c->tiles[(size_t)(row / UMB_TILE_HEIGHT) * c->columns + column / UMB_TILE_WIDTH];
     uint32_t r = row % UMB_TILE_HEIGHT, bit = column % UMB_TILE_WIDTH;
@@ -143,9 +148,9 @@ static window window_of(const raster *r, double x_min, double y_min, double x_ma
 {
     window w;
     w.x0 = clamp_pixel(x_min, r->map.width);
-    w.y0 = clamp_pixel(y_min, r->map.height);
+    w.y0 = (uint32_t)umb_raster_map_row_at(&r->map, y_min, -r->map.rows.slack);
     w.x1 = clamp_pixel(x_max, r->map.width);
-    w.y1 = clamp_pixel(y_max, r->map.height);
+    w.y1 = (uint32_t)umb_raster_map_row_at(&r->map, y_max, r->map.rows.slack);
     w.tx0 = w.x0 / UMB_TILE_WIDTH;
     w.ty0 = w.y0 / UMB_TILE_HEIGHT;
     w.tx1 = w.x1 / UMB_TILE_WIDTH;
@@ -216,13 +221,18 @@ static bool want_tiles(raster *r, const window *w)
     return any;
 }
 
+/* A rectangle of the raster. */
+typedef struct area {
+    double x, y, width, height;
+} area;
+
 /* Least nearness of a triangle over a sub-tile: its plane at the corner where it is farthest, or
  * its farthest vertex where that is nearer. The loss of 2^-21 covers the plane's 2^-22 and the
  * float. */
-static float farthest_in(const umb_depth_triangle *t, double x, double y)
+static float farthest_in(const umb_depth_triangle *t, const area *a)
 {
-    double gx = t->gx < 0.0 ? t->gx * 8.0 : 0.0, gy = t->gy < 0.0 ? t->gy * 4.0 : 0.0;
-    double z = t->g0 + (t->gx * x + gx) + (t->gy * y + gy);
+    double gx = t->gx < 0.0 ? t->gx * a->width : 0.0, gy = t->gy < 0.0 ? t->gy * a->height : 0.0;
+    double z = t->g0 + (t->gx * a->x + gx) + (t->gy * a->y + gy);
     z = z > t->least ? z : t->least;
     return (float)(z - 0x1p-21 * fabs(z));
 }
@@ -230,13 +240,12 @@ static float farthest_in(const umb_depth_triangle *t, double x, double y)
 typedef enum overlap { BESIDE, TOUCHES, HOLDS } overlap;
 
 /* How a triangle's image lies to a closed rectangle of the raster, as far as its sides tell. */
-static overlap place_rect(const umb_depth_triangle *t, double x, double y, double width,
-                          double height)
+static overlap place_rect(const umb_depth_triangle *t, const area *a)
 {
     bool holds = t->side_count > 0;
     for (uint32_t i = 0; i < t->side_count; ++i) {
-        double at = t->ex[i] * x + t->ey[i] * y + t->e0[i];
-        double wide = t->ex[i] * width, high = t->ey[i] * height;
+        double at = t->ex[i] * a->x + t->ey[i] * a->y + t->e0[i];
+        double wide = t->ex[i] * a->width, high = t->ey[i] * a->height;
         double most = at + (wide > 0.0 ? wide : 0.0) + (high > 0.0 ? high : 0.0);
         double least = at + (wide < 0.0 ? wide : 0.0) + (high < 0.0 ? high : 0.0);
         if (most < -t->margin[i]) {
@@ -260,28 +269,30 @@ static void sub_tile_range(double low, double high, double origin, double size, 
 /* All that touch a sub-tile bound its depth together, from the farthest; one that holds all of it
  * does so alone, however far the others are. */
 static void lower_tile(window_tile *tile, uint8_t wanted, const umb_front_triangle *front,
-                       const umb_depth_triangle *t, uint32_t tx, uint32_t ty)
+                       const umb_depth_triangle *t, const double *edge, uint32_t tx, const window *v,
+                       uint32_t ty)
 {
-    double x0 = tx * UMB_TILE_WIDTH, y0 = ty * UMB_TILE_HEIGHT;
-    overlap whole = place_rect(t, x0, y0, UMB_TILE_WIDTH, UMB_TILE_HEIGHT);
+    double x0 = tx * UMB_TILE_WIDTH;
+    const area all = {x0, edge[0], UMB_TILE_WIDTH, edge[UMB_TILE_HEIGHT] - edge[0]};
+    overlap whole = place_rect(t, &all);
     if (whole == BESIDE) {
         return;
     }
-    int i0, i1, j0, j1;
+    int i0, i1;
     sub_tile_range(front->x_min, front->x_max, x0, 8.0, 4, &i0, &i1);
-    sub_tile_range(front->y_min, front->y_max, y0, 4.0, 2, &j0, &j1);
+    int j0 = v->y0 > ty * UMB_TILE_HEIGHT + 3, j1 = v->y1 >= ty * UMB_TILE_HEIGHT + 4;
     for (int j = j0; j <= j1; ++j) {
         for (int i = i0; i <= i1; ++i) {
             int s = 4 * j + i;
             if ((wanted >> s & 1) == 0) {
                 continue;
             }
-            double x = x0 + 8.0 * i, y = y0 + 4.0 * j;
-            overlap place = whole == HOLDS ? HOLDS : place_rect(t, x, y, 8.0, 4.0);
+            const area sub = {x0 + 8.0 * i, edge[4 * j], 8.0, edge[4 * j + 4] - edge[4 * j]};
+            overlap place = whole == HOLDS ? HOLDS : place_rect(t, &sub);
             if (place == BESIDE) {
                 continue;
             }
-            float z = farthest_in(t, x, y);
+            float z = farthest_in(t, &sub);
             tile->z[s] = z < tile->z[s] ? z : tile->z[s];
             tile->held[s] = place == HOLDS && z > tile->held[s] ? z : tile->held[s];
         }
@@ -307,7 +318,8 @@ static void bound_depth(raster *r, const window *w)
                     umb_silhouette_depth(s, &r->map, front, &t);
                     ready = true;
                 }
-                lower_tile(&r->window[tile], r->wanted[tile], front, &t, tx, ty);
+                lower_tile(&r->window[tile], r->wanted[tile], front, &t,
+                           r->map.rows.edge + (size_t)ty * UMB_TILE_HEIGHT, tx, &v, ty);
             }
         }
     }
@@ -323,7 +335,7 @@ static void merge_tiles(raster *r, const window *w)
                 for (uint32_t s = 0; s < 8; ++s) {
                     tile->z[s] = tile->held[s] > tile->z[s] ? tile->held[s] : tile->z[s];
                 }
-                umb_coverage_merge(&r->coverage, t, tile->mask, tile->z);
+                (void)r->kernels->merge(&r->coverage, t, tile->mask, tile->z);
                 memset(tile->mask, 0, sizeof tile->mask);
             }
         }
@@ -333,12 +345,24 @@ static void merge_tiles(raster *r, const window *w)
 static bool occlude(void *state, uint32_t occluder, umb_cull_stats *stats)
 {
     raster *r = state;
+    const umb_occluder *o = &r->scene->occluders[occluder];
+    if (o->mesh->convex && o->mesh->triangle_count <= UMB_CONVEX_TRIANGLES) {
+        umb_convex_result found = r->kernels->find_convex(&r->map, o, &r->convex);
+        if (found == UMB_CONVEX_READY) {
+            stats->occluders += 1;
+            stats->edges += r->convex.edge_count;
+            return r->kernels->fill_convex(&r->coverage, &r->map, &r->convex);
+        }
+        if (found == UMB_CONVEX_NOTHING) {
+            return false;
+        }
+    }
     umb_silhouette *s = &r->silhouette;
-    if (!umb_silhouette_find(s, &r->map, &r->scene->occluders[occluder])) {
+    if (!umb_silhouette_find(s, &r->map, o)) {
         return false;
     }
     window w = window_of(r, s->x_min, s->y_min, s->x_max, s->y_max);
-    umb_fill_begin(&r->fill, w.x0, w.y0, w.x1, w.y1);
+    umb_fill_begin(&r->fill, &r->map, w.x0, w.y0, w.x1, w.y1);
     for (uint32_t i = 0; i < s->edge_count; ++i) {
         umb_fill_edge(&r->fill, &s->edges[i]);
     }
@@ -359,5 +383,5 @@ static const umb_coverage *buffer(const void *state)
 }
 
 const umb_method_ops umb_raster_method = {
-    "raster", UMB_CLASS_STRICT, create, destroy, prepare, submit, open_at, occlude, buffer,
+    "raster", UMB_CLASS_STRICT, create, destroy, prepare, hides, hidden, open_at, occlude, buffer,
 };

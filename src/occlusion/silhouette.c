@@ -39,8 +39,8 @@ void umb_silhouette_free(umb_silhouette *s, const umb_allocator *a)
     memset(s, 0, sizeof *s);
 }
 
-/* World, view and raster position of every vertex. The near cut is placed 64 units of the mesh's
- * reach beyond the near depth: then what is kept, rounding included, is truly beyond it. */
+/* World, view and raster position of every vertex. The cut is placed 64 units of the mesh's
+ * reach beyond near_cut: then what is kept, rounding included, is truly beyond it. */
 static bool place_vertices(umb_silhouette *s, const umb_raster_map *map, const umb_occluder *o)
 {
     const umb_mesh *mesh = o->mesh;
@@ -54,7 +54,7 @@ static bool place_vertices(umb_silhouette *s, const umb_raster_map *map, const u
         s->views[v] = umb_raster_map_point(map, s->world[v]);
         reach = s->views[v].reach > reach ? s->views[v].reach : reach;
     }
-    s->cut_depth = map->near_depth + 64.0 * UMB_U * (reach + fabs(map->near_depth));
+    s->cut_depth = map->near_cut + 64.0 * UMB_U * (reach + fabs(map->near_cut));
     bool any = false;
     for (uint32_t v = 0; v < mesh->block_position_count; ++v) {
         if (s->views[v].w >= s->cut_depth) {

@@ -53,7 +53,7 @@ typedef struct umb_silhouette {
     float (*world)[3];
     int8_t *sides;
     size_t capacity[6]; /* of edges, triangles, views, points, world, sides */
-    double cut_depth;   /* what lies nearer is cut away: the near depth, plus rounding */
+    double cut_depth;   /* W before which all is cut away: near_cut, plus rounding */
 } umb_silhouette;
 
 /* Make room for every mesh up to these sizes. */

@@ -416,6 +416,16 @@ static void make_view(rng *r, const model *m, umb_view *view)
     view->height = 96;
 }
 
+/* The view's own up to begin with, rolled or not; then one that is not the view's, none, any at all. */
+static void choose_vertical(uint64_t i, umb_view *view)
+{
+    rng r = {i * 0x9E3779B97F4A7C15u + 11};
+    const double upright[3] = {0, 1, 0}, none[3] = {0}, any[3] = {between(&r, -1, 1), between(&r, -1, 1),
+                                                                  between(&r, -1, 1)};
+    const double *choice[4] = {view->vertical, upright, none, any};
+    memmove(view->vertical, choice[i % 4], sizeof none);
+}
+
 bool micro_scene_make(uint64_t i, micro_scene *out)
 {
     const kind *k = &KINDS[i % micro_scene_kinds()];
@@ -431,6 +441,7 @@ bool micro_scene_make(uint64_t i, micro_scene *out)
     }
     out->model = b.model;
     make_view(&b.random, b.model, &out->view);
+    choose_vertical(i / micro_scene_kinds(), &out->view);
     return true;
 }
 
