@@ -820,6 +820,29 @@ static void test_impossible_volumes(void **state)
         assert_memory_equal(&v, &before, sizeof v);                                                \
     }
 
+/* The vertical is what was said of it, never an axis that was only chosen. */
+static void test_vertical(void **state)
+{
+    (void)state;
+    static const double eye[3] = {0, 0, 0}, target[3] = {0, -1, 1}, up[3] = {0, 3, 0};
+    umb_view camera, v;
+    assert_int_equal(umb_view_look_at(&camera, eye, target, up, 1, 1, 0.1, 10), UMB_OK);
+    umb_spot_def spot = {.direction = {0, -1, 1}, .angle = 1, .near_depth = 0.1, .range = 10};
+    umb_sun_def sun = {.camera = &camera, .direction = {1, -1, 0}, .reach = 5};
+    umb_volume_def volume = {.planes = CRATE, .plane_count = 6};
+    for (int given = 0; given < 2; ++given) {
+        assert_int_equal(umb_view_spot(&v, &spot, NULL), UMB_OK);
+        assert_true(v.vertical[0] == 0.0 && v.vertical[1] == given && v.vertical[2] == 0.0);
+        assert_int_equal(umb_view_from_volume(&v, &volume, NULL), UMB_OK);
+        assert_true(v.vertical[0] == 0.0 && v.vertical[1] == given && v.vertical[2] == 0.0);
+        assert_int_equal(umb_view_sun(&v, &sun, NULL), UMB_OK);
+        assert_memory_equal(v.vertical, camera.vertical, sizeof v.vertical);
+        memcpy(spot.up, up, sizeof up);
+        memcpy(volume.up, up, sizeof up);
+        sun.up[2] = 1.0;
+    }
+}
+
 static void test_impossible_lights(void **state)
 {
     (void)state;
@@ -936,6 +959,7 @@ int main(void)
         cmocka_unit_test(test_impossible_volumes),
         cmocka_unit_test(test_impossible_lights),
         cmocka_unit_test(test_absurd_numbers),
+        cmocka_unit_test(test_vertical),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

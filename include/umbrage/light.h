@@ -5,7 +5,8 @@
  * other. Safe direction: the view's closed frustum holds every point of the volume that is
  * asked for, in real numbers, whatever rounding does to its members; it may be larger. Nothing
  * is allocated. The picture's sizes, thresholds and time of *out are zeroed; on an error *out
- * is left as it was, and error, unless NULL, says why.
+ * is left as it was, and error, unless NULL, says why. The view's vertical is an `up` that is
+ * given (sun: the camera's vertical), else unknown: set it afterwards where it is known.
  *
  * For shadows: an object that is hidden from the light casts no shadow of its own. What hides
  * it may lie outside the extra planes of a view; with the views of spot, cube and sun it does

@@ -365,6 +365,7 @@ umb_result umb_view_sun(umb_view *out, const umb_sun_def *def, umb_error *error)
     }
     for (int i = 0; i < 3; ++i) {
         view.eye[i] = def->camera->eye[i];
+        view.vertical[i] = def->camera->vertical[i];
     }
     trim_to_sweep(&view, def->camera, &s, def->reach);
     return finish(out, &view, error);

@@ -19,7 +19,14 @@ umb_result umb_view_aim(umb_view *out, const double direction[3], const double u
     }
     stand_in[least] = 1.0;
     bool chosen = up[0] == 0.0 && up[1] == 0.0 && up[2] == 0.0;
-    return umb_view_look_at_ortho(out, origin, d, chosen ? stand_in : up, 2.0, 1.0, 0.0, 1.0);
+    umb_result result = umb_view_look_at_ortho(out, origin, d, chosen ? stand_in : up, 2.0, 1.0,
+                                               0.0, 1.0);
+    if (result == UMB_OK) {
+        for (int i = 0; i < 3 && chosen; ++i) {
+            out->vertical[i] = 0.0;
+        }
+    }
+    return result;
 }
 
 /* The corner of the six sides with bits x, y, z of k set where the greater bound is meant,

@@ -6,8 +6,8 @@
 #include "umbrage/view.h"
 
 /* Zero *out and set its axes: forward along direction (any length), up as near to `up` as can
- * be; a zero `up` stands for the coordinate axis farthest from direction. Axes have unit
- * length, and forward is within 8 units 2^-53 of the true direction. UMB_ERROR_ARGUMENT for
+ * be; a zero `up` stands for the coordinate axis farthest from direction, and leaves the
+ * vertical unknown, which else is up. Axes have unit length, and forward is within 8 units 2^-53 of the true direction. UMB_ERROR_ARGUMENT for
  * what has no direction. */
 umb_result umb_view_aim(umb_view *out, const double direction[3], const double up[3]);
 

@@ -425,8 +425,11 @@ static const char *make(umb_view *view, const umb_volume_def *def, volume *v)
     if (!choose_axes(view, def, v)) {
         return "forward and up must be finite, at most 1e30";
     }
+    /* An up that was only tried says nothing of the scene's vertical. */
+    bool known = umb_vec3_sum_abs(umb_vec3_from_double(def->up)) > 0.0;
     for (int i = 0; i < 3; ++i) {
         view->eye[i] = eye[i];
+        view->vertical[i] = known ? view->vertical[i] : 0.0;
     }
     return fit(view, v);
 }

@@ -27,8 +27,8 @@ ask --eye -30,1.7,-4 --target 20,1.7,-3 --threads 3 >threads
 same "threads" spaced threads
 ask --eye -30,1.7,-4 --target 20,1.7,-3 --isa scalar >scalar
 same "isa" spaced scalar
-ask --eye 0,50,0 --target 0,0,0 >down
-ask --eye 0,50,0 --target 0,0,0 --up z >down_z
+ask --method none --eye 0,50,0 --target 0,0,0 >down
+ask --method none --eye 0,50,0 --target 0,0,0 --up z >down_z
 same "looking along up, z takes its place" down down_z
 
 printf 'ex,ey,ez,tx,ty,tz\n0,1,0,9,1,0\n-30,1.7,-4,20,1.7,-3\n' >path.csv

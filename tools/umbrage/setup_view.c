@@ -100,7 +100,12 @@ static umb_result make_shape(const model *m, const options *o, const aim *a, umb
         return make_spot(o, a, out, error);
     }
     if (options_given(o, "cube")) {
-        return umb_view_cube_face(out, a->eye, o->cube, a->near_depth, a->far_depth, error);
+        umb_result result = umb_view_cube_face(out, a->eye, o->cube, a->near_depth, a->far_depth,
+                                               error);
+        if (result == UMB_OK) {
+            memcpy(out->vertical, a->up, sizeof out->vertical);
+        }
+        return result;
     }
     return options_given(o, "sun") ? make_sun(m, o, a, out, error) : make_camera(o, a, out);
 }
