@@ -289,6 +289,14 @@ void umb_mesh_destroy(const umb_allocator *allocator, umb_mesh *mesh)
 
 /* ---- in the world --------------------------------------------------------------------------- */
 
+/* True if each axis stays itself: things that are shifted, the most common of all moves. */
+static bool keeps_axes(const umb_transform *t)
+{
+    uint32_t bits[12];
+    memcpy(bits, t->m, sizeof bits);
+    return (bits[1] | bits[2] | bits[4] | bits[6] | bits[8] | bits[9]) << 1 == 0;
+}
+
 /* True if each row looks at one axis at most. */
 static bool keeps_boxes(const umb_transform *t)
 {
@@ -326,6 +334,17 @@ static inline void move_corners(const umb_aabb *box, const umb_transform *t, umb
     }
 }
 
+/* The same when the axes stay: the other products are zeros, which change no sum. */
+static inline void move_along_axes(const umb_aabb *box, const umb_transform *t, umb_aabb *out)
+{
+    for (int i = 0; i < 3; ++i) {
+        double a = (double)t->m[i][i] * box->min[i] + (double)t->m[i][3];
+        double b = (double)t->m[i][i] * box->max[i] + (double)t->m[i][3];
+        out->min[i] = (float)lower(a, b);
+        out->max[i] = (float)higher(a, b);
+    }
+}
+
 typedef struct extent {
     double low, high;
 } extent;
@@ -351,26 +370,38 @@ static void move_points(const float (*points)[3], uint32_t count, const umb_tran
                       {(float)x.high, (float)y.high, (float)z.high}};
 }
 
+typedef enum way { ALONG_AXES, BY_CORNERS, BY_POINTS } way;
+
+static inline void move_box(way w, const umb_mesh *mesh, const umb_aabb *box, uint32_t count,
+                            const umb_transform *t, umb_aabb *out)
+{
+    if (w == ALONG_AXES) {
+        move_along_axes(box, t, out);
+    } else if (w == BY_CORNERS) {
+        move_corners(box, t, out);
+    } else {
+        move_points((const float(*)[3])mesh->positions, count, t, out);
+    }
+}
+
 const umb_aabb *umb_mesh_world_bounds(const umb_mesh *mesh, const umb_transform *transform,
                                       umb_mesh_place *out)
 {
-    bool same = mesh->block_position_count == mesh->position_count;
-    bool corners = (mesh->box && same) || keeps_boxes(transform);
-    const float(*points)[3] = (const float(*)[3])mesh->positions;
-    if (corners) {
-        move_corners(&mesh->bounds, transform, &out->bounds);
-    } else {
-        move_points(points, mesh->position_count, transform, &out->bounds);
+    uint32_t all = mesh->position_count, blocking = mesh->block_position_count;
+    way w = BY_POINTS;
+    if (keeps_axes(transform)) {
+        w = ALONG_AXES;
+    } else if ((mesh->box && blocking == all) || keeps_boxes(transform)) {
+        w = BY_CORNERS;
     }
-    if (same) {
+    move_box(w, mesh, &mesh->bounds, all, transform, &out->bounds);
+    if (blocking == all) {
         return &out->bounds;
     }
-    if (mesh->block_position_count == 0) {
+    if (blocking == 0) {
         memset(&out->block_bounds, 0, sizeof out->block_bounds);
-    } else if (corners) {
-        move_corners(&mesh->block_bounds, transform, &out->block_bounds);
     } else {
-        move_points(points, mesh->block_position_count, transform, &out->block_bounds);
+        move_box(w, mesh, &mesh->block_bounds, blocking, transform, &out->block_bounds);
     }
     return &out->block_bounds;
 }
