@@ -244,11 +244,20 @@ static void report(walk *w, const umb_waiting *item)
 /* True if the object may be seen, asked in detail when its shape is all that is drawn. */
 static bool object_shows(walk *w, const umb_object *o, umb_waiting *item)
 {
-    if (w->culler->ops == NULL || !umb_detail_helps(o)) {
+    const umb_culler *c = w->culler;
+    if (c->ops == NULL) {
         return true;
     }
-    umb_asker asker = {w->culler->ops, w->culler->method, &w->map, &w->stats};
-    return umb_detail_shows(&asker, o, &item->part, &item->settled);
+    umb_asker asker = {c->ops, c->method, &w->map, &w->stats};
+    switch (umb_detail_of(o)) {
+    case UMB_DETAIL_NONE:
+        return true;
+    case UMB_DETAIL_BODY:
+        w->stats.queries += item->testable;
+        return !(item->testable && c->ops->hides_body(c->method, o->occluder, &item->image));
+    default:
+        return umb_detail_shows(&asker, o, &item->part, &item->settled);
+    }
 }
 
 /* An object whose turn has come. It is reported only when everything that can hide it has been

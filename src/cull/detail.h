@@ -14,8 +14,14 @@ typedef struct umb_asker {
     umb_cull_stats *stats;
 } umb_asker;
 
-/* True if asking in detail can tell more than the object's bounds do. */
-bool umb_detail_helps(const umb_object *o);
+/* In what detail it is worth asking about an object. */
+typedef enum umb_detail {
+    UMB_DETAIL_NONE, /* its bounds say all that is known */
+    UMB_DETAIL_BODY, /* it is one convex body, the one that its occluder is */
+    UMB_DETAIL_PARTS /* by its parts, then by triangles */
+} umb_detail;
+
+umb_detail umb_detail_of(const umb_object *o);
 
 /* One question: all of an image, or the outline in it. */
 bool umb_detail_hidden(const umb_asker *a, const umb_image *image, const umb_outline *outline);

@@ -263,8 +263,8 @@ static inline void finish_perspective(const umb_projector *p, const faces *d, bo
 
 /* X and W do not depend on the vertical v: a box has four upright edges, and each is a column. s and t are the
  * other axes. */
-static inline void project_upright(const umb_node *node, const umb_projector *p, int v, int s, int t, int at,
-                                   umb_projected *out)
+UMB_INLINE void project_upright(const umb_node *node, const umb_projector *p, int v, int s, int t, int at,
+                                umb_projected *out)
 {
     faces d = faces_of(node, p, at);
     umb_fv x0 = p->x[s] * d.low[s], x1 = p->x[s] * d.high[s];

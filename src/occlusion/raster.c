@@ -26,7 +26,9 @@ typedef struct raster {
     umb_coverage coverage;
     umb_fill fill;
     umb_silhouette silhouette;
-    umb_convex convex;
+    umb_convex convex; /* of the occluder convex_of, UMB_NONE: of none */
+    umb_convex_result convex_found;
+    uint32_t convex_of;
     window_tile *window; /* one per tile of the buffer; masks all zero between draws */
     uint8_t *wanted;     /* per tile: the sub-tiles that the occluder changes, a bit each */
     uint32_t *row;       /* one row of covered words */
@@ -96,6 +98,7 @@ static umb_result prepare(void *state, const umb_raster_map *map, const umb_comm
     raster *r = state;
     r->map = *map;
     r->scene = scene;
+    r->convex_of = UMB_NONE;
     if (!umb_coverage_resize(&r->coverage, &r->allocator, map->width, map->height) ||
         !umb_fill_resize(&r->fill, &r->allocator, map->width, map->height) || !reserve_window(r) ||
         !reserve_silhouette(r, scene)) {
@@ -342,24 +345,46 @@ static void merge_tiles(raster *r, const window *w)
     }
 }
 
+/* The convex image of an occluder; asked for and drawn one after the other, it is found once. */
+static umb_convex_result find_convex(raster *r, uint32_t occluder)
+{
+    if (r->convex_of != occluder) {
+        r->convex_of = occluder;
+        r->convex_found = r->kernels->find_convex(&r->map, &r->scene->occluders[occluder], &r->convex);
+    }
+    return r->convex_found;
+}
+
+static bool hides_body(void *state, uint32_t occluder, const umb_image *image)
+{
+    raster *r = state;
+    const umb_mesh *mesh = r->scene->occluders[occluder].mesh;
+    if (!mesh->convex || mesh->triangle_count > UMB_CONVEX_TRIANGLES ||
+        find_convex(r, occluder) == UMB_CONVEX_OTHER) {
+        return false;
+    }
+    return r->kernels->hides_convex(&r->coverage, &r->map, &r->convex, image->rect);
+}
+
 static bool occlude(void *state, uint32_t occluder, umb_cull_stats *stats)
 {
     raster *r = state;
     const umb_occluder *o = &r->scene->occluders[occluder];
-    if (o->mesh->convex && o->mesh->triangle_count <= UMB_CONVEX_TRIANGLES) {
-        umb_convex_result found = r->kernels->find_convex(&r->map, o, &r->convex);
-        if (found == UMB_CONVEX_READY) {
-            stats->occluders += 1;
-            stats->edges += r->convex.edge_count;
-            return r->kernels->fill_convex(&r->coverage, &r->map, &r->convex);
-        }
-        if (found == UMB_CONVEX_NOTHING) {
+    bool convex = o->mesh->convex && o->mesh->triangle_count <= UMB_CONVEX_TRIANGLES;
+    umb_convex_result found = convex ? find_convex(r, occluder) : UMB_CONVEX_OTHER;
+    umb_silhouette *s = &r->silhouette;
+    if (found == UMB_CONVEX_OTHER) {
+        r->convex_of = UMB_NONE;
+        if (!umb_silhouette_find(s, &r->map, o)) {
             return false;
         }
+        found = convex ? umb_convex_of_silhouette(s, &r->map, &r->convex) : UMB_CONVEX_OTHER;
     }
-    umb_silhouette *s = &r->silhouette;
-    if (!umb_silhouette_find(s, &r->map, o)) {
-        return false;
+    if (found != UMB_CONVEX_OTHER) {
+        stats->occluders += found == UMB_CONVEX_READY;
+        stats->edges += found == UMB_CONVEX_READY ? r->convex.edge_count : 0;
+        return found == UMB_CONVEX_READY &&
+               r->kernels->fill_convex(&r->coverage, &r->map, &r->convex);
     }
     window w = window_of(r, s->x_min, s->y_min, s->x_max, s->y_max);
     umb_fill_begin(&r->fill, &r->map, w.x0, w.y0, w.x1, w.y1);
@@ -383,5 +408,5 @@ static const umb_coverage *buffer(const void *state)
 }
 
 const umb_method_ops umb_raster_method = {
-    "raster", UMB_CLASS_STRICT, create, destroy, prepare, hides, hidden, open_at, occlude, buffer,
+    "raster", UMB_CLASS_STRICT, create, destroy, prepare, hides, hidden, hides_body, open_at, occlude, buffer,
 };

@@ -134,10 +134,12 @@ static bool merge(umb_coverage *c, uint32_t tile, const uint32_t mask[UMB_TILE_H
 /* Vertices of the shape on the raster. */
 typedef struct corners {
     double x[UMB_CONVEX_VERTICES], y[UMB_CONVEX_VERTICES];
-    double near_least[UMB_CONVEX_VERTICES]; /* nearness, rounded away from the eye by more than its error */
+    /* Nearness, rounded away from the eye by more than its error, and towards it. */
+    double near_least[UMB_CONVEX_VERTICES], near_most[UMB_CONVEX_VERTICES];
     double error;                           /* of each x and y */
     double x_min, y_min, x_max, y_max;      /* of the computed ones */
     double most;                            /* nearness, rounded towards the eye */
+    double near_size;                       /* largest absolute nearness */
 } corners;
 
 /* World vertices, relative to the eye, component by component; the last one again up to a whole vector. */
@@ -156,7 +158,7 @@ static uint32_t place(const umb_raster_map *map, const umb_occluder *o, double d
         d[1][v] = p[1] - map->eye.y;
         d[2][v] = p[2] - map->eye.z;
     }
-    uint32_t whole = (count + 3) & ~3u;
+    uint32_t whole = (count + UMB_WIDE - 1) & ~(uint32_t)(UMB_WIDE - 1);
     for (uint32_t v = count; v < whole; ++v) {
         for (int axis = 0; axis < 3; ++axis) {
             d[axis][v] = d[axis][count - 1];
@@ -171,6 +173,7 @@ static bool project_corners(const umb_raster_map *m, const double d[3][UMB_CONVE
 {
     umb_dv x_min = umb_dv_set(INFINITY), y_min = x_min, most = -x_min;
     umb_dv x_max = -x_min, y_max = -x_min, error = umb_dv_set(0.0), reach_most = error, w_min = x_min;
+    umb_dv near_size = error;
     for (uint32_t v = 0; v < count; v += UMB_WIDE) {
         umb_dv dx = umb_dv_load(d[0] + v), dy = umb_dv_load(d[1] + v), dz = umb_dv_load(d[2] + v);
         umb_dv reach = (umb_dv_abs(dx) + umb_dv_abs(dy)) + umb_dv_abs(dz);
@@ -199,10 +202,12 @@ static bool project_corners(const umb_raster_map *m, const double d[3][UMB_CONVE
             near_least = r - r * (2.0 * off * r + 4.0 * UMB_U);
             near_most = r + r * (2.0 * off * r + 4.0 * UMB_U);
         }
-        memcpy(out->x + v, &x, sizeof x);
-        memcpy(out->y + v, &y, sizeof y);
-        memcpy(out->near_least + v, &near_least, sizeof near_least);
+        umb_dv_store(out->x + v, x);
+        umb_dv_store(out->y + v, y);
+        umb_dv_store(out->near_least + v, near_least);
+        umb_dv_store(out->near_most + v, near_most);
         most = umb_dv_max(most, near_most);
+        near_size = umb_dv_max(near_size, umb_dv_max(umb_dv_abs(near_least), umb_dv_abs(near_most)));
         error = umb_dv_max(error, e);
         reach_most = umb_dv_max(reach_most, reach);
         w_min = umb_dv_min(w_min, w);
@@ -217,6 +222,7 @@ static bool project_corners(const umb_raster_map *m, const double d[3][UMB_CONVE
     out->x_max = -umb_dv_least(-x_max);
     out->y_max = -umb_dv_least(-y_max);
     out->most = -umb_dv_least(-most);
+    out->near_size = -umb_dv_least(-near_size);
     double reach = -umb_dv_least(-reach_most);
     double cut = m->near_cut + 64.0 * UMB_U * (reach + fabs(m->near_cut));
     return umb_dv_least(w_min) >= cut && (m->orthographic || umb_dv_least(w_min) > 0x1p-20 * reach);
@@ -245,48 +251,13 @@ static uint32_t find_front(const umb_raster_map *map, const umb_occluder *o, con
     return front;
 }
 
-/* A line of the outline, moved inwards by the error of its ends and by what evaluating it at a height of the
- * raster may lose. dx, dy run with the inside on the right hand as y grows downwards: down is a left border.
- * Flatter lines than this are heights: between x_min and x_max they rise by less than 2^-16 of a pixel. */
-#define FLAT 0x1p-30
-
-static void add_line(umb_convex *out, const umb_raster_map *map, const corners *c, uint32_t from, uint32_t to,
-                     double *y_min, double *y_max)
-{
-    double x0 = c->x[from], y0 = c->y[from];
-    double dx = c->x[to] - x0, dy = c->y[to] - y0;
-    if (fabs(dy) <= FLAT * fabs(dx)) {
-        double low = y0 < c->y[to] ? y0 : c->y[to];
-        double high = y0 < c->y[to] ? c->y[to] : y0;
-        double off = c->error + 2.0 * FLAT * (c->x_max - c->x_min) + 0x1p-50 * (fabs(low) + fabs(high));
-        if (dx < 0.0) {
-            *y_min = high + off > *y_min ? high + off : *y_min;
-        } else {
-            *y_max = low - off < *y_max ? low - off : *y_max;
-        }
-        return;
-    }
-    double slope = dx / dy;
-    double at = x0 - slope * y0;
-    double off = c->error * (1.0 + fabs(slope)) +
-                 16.0 * UMB_U * (fabs(slope) * (map->height + fabs(y0)) + fabs(x0)) + 0x1p-20;
-    if (dy > 0.0) {
-        out->left_slope[out->left_count] = slope;
-        out->left_at[out->left_count++] = at + off;
-    } else {
-        out->right_slope[out->right_count] = slope;
-        out->right_at[out->right_count++] = at - off;
-    }
-}
-
-/* The silhouette: edges of which one side faces the eye. False if one has no length: nothing is known of
- * such a chain. */
+/* The silhouette: edges of which one side faces the eye. */
 static bool find_lines(umb_convex *out, const umb_raster_map *map, const umb_occluder *o, const corners *c,
-                       uint32_t front, double *y_min, double *y_max)
+                       uint32_t front, umb_convex_frame *frame)
 {
     const umb_mesh *mesh = o->mesh;
     int turn = o->mirrored ? -map->turn : map->turn;
-    out->left_count = out->right_count = 0;
+    out->left.count = out->right.count = out->edge_count = 0;
     for (uint32_t i = 0; i < mesh->edge_count; ++i) {
         const umb_edge *e = &mesh->edges[i];
         uint32_t one = front >> e->f0 & 1u;
@@ -296,37 +267,42 @@ static bool find_lines(umb_convex *out, const umb_raster_map *map, const umb_occ
         bool along = (one != 0) == (turn > 0);
         uint32_t from = along ? e->v0 : e->v1;
         uint32_t to = along ? e->v1 : e->v0;
-        if (c->x[from] == c->x[to] && c->y[from] == c->y[to]) {
+        if (!umb_convex_add_line(out, frame, c->x[from], c->y[from], c->x[to], c->y[to])) {
             return false;
         }
-        out->edge_count += 1;
-        add_line(out, map, c, from, to, y_min, y_max);
     }
     return true;
 }
 
-static float float_below(double v)
+/* Move the outer lines until no corner is beyond them. */
+static void hold_corners(umb_convex_lines *lines, const corners *c, uint32_t count, double height, double side)
 {
-    return (float)(v - 0x1p-22 * fabs(v));
+    for (uint32_t i = 0; i < lines->count; ++i) {
+        double slope = lines->slope[i];
+        umb_dv beyond = umb_dv_set(-INFINITY);
+        for (uint32_t v = 0; v < count; v += UMB_WIDE) {
+            umb_dv x = umb_dv_load(c->x + v), y = umb_dv_load(c->y + v);
+            beyond = umb_dv_max(beyond, side * (x - slope * y));
+        }
+        double most = -umb_dv_least(-beyond);
+        double size = fabs(slope) * (height + fabs(c->y_min) + fabs(c->y_max)) + fabs(c->x_min) + fabs(c->x_max);
+        most += c->error * (1.0 + fabs(slope)) + 16.0 * UMB_U * (size + fabs(most));
+        lines->out_at[i] = side * most;
+    }
 }
 
 /* The plane of a triangle as the raster has it: the affine function through its computed corners, whatever
- * their errors, lowered until it is nowhere above the nearness of the true ones. Both are affine over the
- * triangle's image, so that holds between corners too. */
+ * their errors, moved until it is nowhere above the nearness of the true ones (low), or nowhere below that of any
+ * corner of the body (high). */
 typedef struct plane {
-    double gx, gy, g0, least;
+    double gx, gy, low, high, least;
 } plane;
 
-static double plane_excess(const plane *p, const corners *c, const uint32_t k[3], double width, double height)
+/* How much gx x + gy y may be off at a corner. */
+static double plane_error(const plane *p, const corners *c)
 {
-    double excess = -INFINITY;
-    for (int i = 0; i < 3; ++i) {
-        double over = (p->gx * c->x[k[i]] + p->gy * c->y[k[i]] + p->g0) - c->near_least[k[i]];
-        excess = over > excess ? over : excess;
-    }
-    double terms = fabs(p->gx) * (width + fabs(c->x_min) + fabs(c->x_max)) +
-                   fabs(p->gy) * (height + fabs(c->y_min) + fabs(c->y_max)) + fabs(p->g0);
-    return excess + (fabs(p->gx) + fabs(p->gy)) * c->error + 0x1p-50 * terms;
+    double size = fabs(p->gx) * (fabs(c->x_min) + fabs(c->x_max)) + fabs(p->gy) * (fabs(c->y_min) + fabs(c->y_max));
+    return (fabs(p->gx) + fabs(p->gy)) * c->error + 0x1p-50 * (size + c->near_size);
 }
 
 static double least_of_triangle(const corners *c, const uint32_t k[3])
@@ -336,78 +312,86 @@ static double least_of_triangle(const corners *c, const uint32_t k[3])
     return a < d ? a : d;
 }
 
-static void plane_of(plane *p, const umb_raster_map *map, const corners *c, const uint32_t k[3])
+/* The least and the greatest of near_least - (gx x + gy y) at a triangle's corners. */
+static void plane_offsets(const plane *p, const corners *c, const uint32_t k[3], double *least, double *most)
+{
+    *least = INFINITY;
+    *most = -INFINITY;
+    for (int i = 0; i < 3; ++i) {
+        double at = c->near_least[k[i]] - (p->gx * c->x[k[i]] + p->gy * c->y[k[i]]);
+        *least = at < *least ? at : *least;
+        *most = at > *most ? at : *most;
+    }
+}
+
+static void plane_of(plane *p, const corners *c, const uint32_t k[3])
 {
     double x1 = c->x[k[1]] - c->x[k[0]], y1 = c->y[k[1]] - c->y[k[0]];
     double x2 = c->x[k[2]] - c->x[k[0]], y2 = c->y[k[2]] - c->y[k[0]];
     double z1 = c->near_least[k[1]] - c->near_least[k[0]], z2 = c->near_least[k[2]] - c->near_least[k[0]];
-    double scale = 1.0 / (x1 * y2 - x2 * y1);
+    double scale = 1.0 / (x1 * y2 - x2 * y1), most;
     p->gx = (z1 * y2 - z2 * y1) * scale;
     p->gy = (z2 * x1 - z1 * x2) * scale;
-    p->g0 = c->near_least[k[0]] - (p->gx * c->x[k[0]] + p->gy * c->y[k[0]]);
     p->least = least_of_triangle(c, k);
-    p->g0 -= plane_excess(p, c, k, map->width, map->height);
+    plane_offsets(p, c, k, &p->low, &most);
+    p->low -= plane_error(p, c);
 }
 
 /* Two triangles of one flat side share a plane: the second lowers the first by what it must. */
-static bool share_plane(plane *planes, uint32_t count, const umb_raster_map *map, const corners *c,
-                        const uint32_t k[3])
+static bool share_plane(plane *planes, uint32_t count, const corners *c, const uint32_t k[3])
 {
-    double least = least_of_triangle(c, k);
     for (uint32_t i = 0; i < count; ++i) {
         plane *p = &planes[i];
-        double over = plane_excess(p, c, k, map->width, map->height);
-        double under = INFINITY;
-        for (int j = 0; j < 3 && fabs(over) < 0x1p-12 * fabs(least); ++j) {
-            double below = (p->gx * c->x[k[j]] + p->gy * c->y[k[j]] + p->g0) - c->near_least[k[j]];
-            under = below < under ? below : under;
-        }
-        if (fabs(over) < 0x1p-12 * fabs(least) && under > -0x1p-12 * fabs(least)) {
-            p->g0 -= over > 0.0 ? over : 0.0;
-            p->least = least < p->least ? least : p->least;
+        double least, most, alike = 0x1p-12 * fabs(p->least);
+        plane_offsets(p, c, k, &least, &most);
+        if (fabs(least - p->low) < alike && fabs(most - p->low) < alike) {
+            least -= plane_error(p, c);
+            p->low = least < p->low ? least : p->low;
+            double far_corner = least_of_triangle(c, k);
+            p->least = far_corner < p->least ? far_corner : p->least;
             return true;
         }
     }
     return false;
 }
 
-/* In floats: five roundings of terms whose sum of sizes over the raster is size, 8 units taken off. */
-static void store_plane(umb_convex *out, const umb_raster_map *map, const plane *p)
+static void raise_plane(plane *p, const corners *c, uint32_t count)
 {
-    uint32_t i = out->plane_count++;
-    double size = fabs(p->gx) * map->width + fabs(p->gy) * map->height + fabs(p->g0);
-    bool fits = size < 1e30;
-    out->gx[i] = fits ? (float)p->gx : 0.0f;
-    out->gy[i] = fits ? (float)p->gy : 0.0f;
-    out->least[i] = float_below(p->least);
-    out->g0[i] = fits ? (float)(p->g0 - 0x1p-21 * size) : out->least[i];
+    umb_dv above = umb_dv_set(-INFINITY);
+    for (uint32_t v = 0; v < count; v += UMB_WIDE) {
+        umb_dv at = p->gx * umb_dv_load(c->x + v) + p->gy * umb_dv_load(c->y + v);
+        above = umb_dv_max(above, umb_dv_load(c->near_most + v) - at);
+    }
+    p->high = -umb_dv_least(-above) + plane_error(p, c);
 }
 
 /* Images of fewer pixels than this take one depth, their farthest corner's. */
 #define PLANE_PIXELS 128.0
 
 static void find_planes(umb_convex *out, const umb_raster_map *map, const umb_occluder *o, const corners *c,
-                        uint32_t front)
+                        uint32_t vertices, uint32_t front)
 {
     plane planes[UMB_CONVEX_TRIANGLES];
     uint32_t count = 0;
     double least = INFINITY;
-    bool small = (out->x_max - out->x_min) * (out->row1 - out->row0 + 1) < PLANE_PIXELS;
+    bool small = (out->x_max - out->x_min) * ((double)out->row1 - out->row0 + 1.0) < PLANE_PIXELS;
+    out->plane_count = 0;
     for (uint32_t left = front; left != 0; left &= left - 1) {
         const uint32_t *k = o->mesh->triangles[__builtin_ctz(left)];
         if (small) {
             double z = least_of_triangle(c, k);
             least = z < least ? z : least;
-        } else if (!share_plane(planes, count, map, c, k)) {
-            plane_of(&planes[count++], map, c, k);
+        } else if (!share_plane(planes, count, c, k)) {
+            plane_of(&planes[count++], c, k);
         }
     }
-    out->plane_count = 0;
-    if (small) {
-        planes[count++] = (plane){0.0, 0.0, least, least};
+    if (small && front != 0) {
+        umb_convex_add_plane(out, map, 0.0, 0.0, least, c->most, least);
     }
     for (uint32_t i = 0; i < count; ++i) {
-        store_plane(out, map, &planes[i]);
+        raise_plane(&planes[i], c, vertices);
+        umb_convex_add_plane(out, map, planes[i].gx, planes[i].gy, planes[i].low, planes[i].high,
+                             planes[i].least);
     }
 }
 
@@ -419,40 +403,17 @@ static umb_convex_result find_convex(const umb_raster_map *map, const umb_occlud
     if (!project_corners(map, (const double(*)[UMB_CONVEX_VERTICES])d, count, &c)) {
         return UMB_CONVEX_OTHER;
     }
-    double x_min = c.x_min > 0.0 ? c.x_min : 0.0, x_max = c.x_max < map->width ? c.x_max : map->width;
-    double y_min = c.y_min > 0.0 ? c.y_min : 0.0, y_max = c.y_max < map->height ? c.y_max : map->height;
-    if (!(x_max - x_min >= 1.0) || !(y_max > y_min)) {
-        return UMB_CONVEX_NOTHING;
-    }
     uint32_t front = find_front(map, o, &c);
-    if (front == 0) {
-        return UMB_CONVEX_NOTHING;
-    }
-    out->edge_count = 0;
-    if (!find_lines(out, map, o, &c, front, &y_min, &y_max)) {
+    umb_convex_frame frame = {c.error, c.x_max - c.x_min, map->height, c.y_min, c.y_max};
+    if (!find_lines(out, map, o, &c, front, &frame)) {
         return UMB_CONVEX_OTHER;
     }
-    /* Rows that lie wholly between y_min and y_max. */
-    double low = umb_raster_map_row(map, y_min) - map->rows.slack;
-    double high = umb_raster_map_row(map, y_max) + map->rows.slack;
-    int32_t row0 = low > 0.0 ? (int32_t)low : 0;
-    int32_t row1 = high < map->height ? (int32_t)high : (int32_t)map->height - 1;
-    while (row0 <= row1 && map->rows.edge[row0] < y_min) {
-        ++row0;
-    }
-    while (row1 >= row0 && map->rows.edge[row1 + 1] > y_max) {
-        --row1;
-    }
-    if (row0 > row1 || out->left_count == 0 || out->right_count == 0) {
-        return UMB_CONVEX_NOTHING;
-    }
-    out->x_min = x_min;
-    out->x_max = x_max;
-    out->row0 = (uint32_t)row0;
-    out->row1 = (uint32_t)row1;
+    hold_corners(&out->left, &c, count, map->height, -1.0);
+    hold_corners(&out->right, &c, count, map->height, 1.0);
+    bool covers = umb_convex_place(out, map, &frame, c.x_min, c.x_max);
     out->most = (float)(c.most + 0x1p-22 * fabs(c.most));
-    find_planes(out, map, o, &c, front);
-    return UMB_CONVEX_READY;
+    find_planes(out, map, o, &c, count, front);
+    return covers ? UMB_CONVEX_READY : UMB_CONVEX_NOTHING;
 }
 
 /* ---- convex shapes: filling ----------------------------------------------------------------- */
@@ -462,7 +423,7 @@ typedef struct spans {
     umb_iv left[UMB_PARTS], right[UMB_PARTS];
 } spans;
 
-/* A row takes the worse of a line's x at its two ends. Columns are rounded inwards: left_at holds 2^-20 more
+/* A row takes the worse of a line's x at its two ends. Columns are rounded inwards: in_at holds 2^-20 more
  * than it must, which is what the rounding upwards needs. */
 static inline bool find_spans(const umb_convex *v, const double *edge, int32_t first, spans *out)
 {
@@ -475,13 +436,13 @@ static inline bool find_spans(const umb_convex *v, const double *edge, int32_t f
             const double *at = edge + i * UMB_LANES + half * UMB_WIDE;
             umb_dv top = umb_dv_load(at), low = umb_dv_load(at + 1);
             umb_dv l = umb_dv_set(v->x_min), r = most;
-            for (uint32_t k = 0; k < v->left_count; ++k) {
-                double slope = v->left_slope[k];
-                l = umb_dv_max(l, slope * (slope > 0.0 ? low : top) + v->left_at[k]);
+            for (uint32_t k = 0; k < v->left.count; ++k) {
+                double slope = v->left.slope[k];
+                l = umb_dv_max(l, slope * (slope > 0.0 ? low : top) + v->left.in_at[k]);
             }
-            for (uint32_t k = 0; k < v->right_count; ++k) {
-                double slope = v->right_slope[k];
-                r = umb_dv_min(r, slope * (slope > 0.0 ? top : low) + v->right_at[k]);
+            for (uint32_t k = 0; k < v->right.count; ++k) {
+                double slope = v->right.slope[k];
+                r = umb_dv_min(r, slope * (slope > 0.0 ? top : low) + v->right.in_at[k]);
             }
             left[half] = umb_dv_min(l, most) + up;
             right[half] = umb_dv_max(r, zero);
@@ -507,7 +468,8 @@ typedef struct row_planes {
     umb_fv at[UMB_CONVEX_TRIANGLES][UMB_PARTS];
 } row_planes;
 
-static inline void place_planes(const umb_convex *v, const double *edge, row_planes *out)
+/* At the corner of each sub-tile where they are farthest; upper: where the body's bounds are nearest. */
+static inline void place_planes(const umb_convex *v, const double *edge, bool upper, row_planes *out)
 {
     const float y[3] = {(float)edge[0], (float)edge[4], (float)edge[8]};
     float high[8], deep[8];
@@ -517,9 +479,9 @@ static inline void place_planes(const umb_convex *v, const double *edge, row_pla
     }
     for (uint32_t k = 0; k < v->plane_count; ++k) {
         for (int i = 0; i < UMB_PARTS; ++i) {
-            umb_fv row = umb_fv_load((v->gy[k] < 0.0f ? deep : high) + i * UMB_LANES);
-            umb_fv column = umb_fv_load(SUB_X + i * UMB_LANES) + (v->gx[k] < 0.0f ? 8.0f : 0.0f);
-            out->at[k][i] = (v->g0[k] + v->gy[k] * row) + v->gx[k] * column;
+            umb_fv row = umb_fv_load(((v->gy[k] < 0.0f) != upper ? deep : high) + i * UMB_LANES);
+            umb_fv column = umb_fv_load(SUB_X + i * UMB_LANES) + ((v->gx[k] < 0.0f) != upper ? 8.0f : 0.0f);
+            out->at[k][i] = ((upper ? v->high[k] : v->low[k]) + v->gy[k] * row) + v->gx[k] * column;
         }
     }
 }
@@ -561,7 +523,7 @@ static bool fill_convex(umb_coverage *c, const umb_raster_map *map, const umb_co
                 continue;
             }
             if (!ready) {
-                place_planes(v, edge, &planes);
+                place_planes(v, edge, false, &planes);
                 ready = true;
             }
             float x = (float)(tx * UMB_TILE_WIDTH);
@@ -578,4 +540,79 @@ static bool fill_convex(umb_coverage *c, const umb_raster_map *map, const umb_co
     return changed;
 }
 
-const umb_raster_kernels KERNELS = {ISA, hides, hides_rect, merge, find_convex, fill_convex};
+/* Columns of eight rows that the body may touch: between the outer lines at their widest in the row, from the
+ * one to before the other. */
+static inline void find_outer_spans(const umb_convex *v, const double *edge, const umb_pixel_rect *rect,
+                                    spans *out)
+{
+    umb_dv first = umb_dv_set(rect->x0), last = umb_dv_set(rect->x1 + 0.5);
+    for (int i = 0; i < UMB_PARTS; ++i) {
+        umb_dv left[2], right[2];
+        for (int half = 0; half < 2; ++half) {
+            const double *at = edge + i * UMB_LANES + half * UMB_WIDE;
+            umb_dv top = umb_dv_load(at), low = umb_dv_load(at + 1);
+            umb_dv l = first, r = last;
+            for (uint32_t k = 0; k < v->left.count; ++k) {
+                double slope = v->left.slope[k];
+                l = umb_dv_max(l, slope * (slope > 0.0 ? top : low) + v->left.out_at[k]);
+            }
+            for (uint32_t k = 0; k < v->right.count; ++k) {
+                double slope = v->right.slope[k];
+                r = umb_dv_min(r, slope * (slope > 0.0 ? low : top) + v->right.out_at[k]);
+            }
+            /* Beside the rectangle: an empty span. */
+            left[half] = umb_dv_min(l, last + 1.0);
+            right[half] = umb_dv_max(r, first - 1.0) + 1.0;
+        }
+        out->left[i] = umb_dv_trunc(left[0], left[1]);
+        out->right[i] = umb_dv_trunc(right[0], right[1]);
+    }
+}
+
+static bool hides_convex(const umb_coverage *c, const umb_raster_map *map, const umb_convex *v,
+                         umb_pixel_rect rect)
+{
+    uint32_t tx0 = (uint32_t)rect.x0 / UMB_TILE_WIDTH, tx1 = (uint32_t)rect.x1 / UMB_TILE_WIDTH;
+    uint32_t ty0 = (uint32_t)rect.y0 / UMB_TILE_HEIGHT, ty1 = (uint32_t)rect.y1 / UMB_TILE_HEIGHT;
+    row_planes planes;
+    spans s;
+    for (uint32_t ty = ty0; ty <= ty1; ++ty) {
+        const double *edge = map->rows.edge + (size_t)ty * UMB_TILE_HEIGHT;
+        bool ready = false;
+        find_outer_spans(v, edge, &rect, &s);
+        int32_t first = (int32_t)(ty * UMB_TILE_HEIGHT);
+        for (uint32_t tx = tx0; tx <= tx1; ++tx) {
+            size_t t = (size_t)ty * c->columns + tx;
+            if (c->coarse[t] >= v->most) {
+                continue;
+            }
+            const umb_tile *tile = &c->tiles[t];
+            float x = (float)(tx * UMB_TILE_WIDTH);
+            umb_iv open = umb_iv_set(0);
+            for (int i = 0; i < UMB_PARTS; ++i) {
+                int at = i * UMB_LANES;
+                umb_iv row = umb_iv_load(ROW + at) + first;
+                umb_iv need = span_mask(s.left[i], s.right[i], (int32_t)(tx * UMB_TILE_WIDTH)) &
+                              (row >= rect.y0) & (row <= rect.y1);
+                umb_iv asked = (umb_iv_or_fours(need) & umb_iv_load(SUB_BYTE + at)) != 0;
+                open |= need & ~umb_iv_load(tile->mask + at);
+                umb_fv z = umb_fv_set(v->most);
+                if (!ready) {
+                    place_planes(v, edge, true, &planes);
+                    ready = true;
+                }
+                for (uint32_t k = 0; k < v->plane_count; ++k) {
+                    z = umb_fv_min(z, planes.at[k][i] + v->gx[k] * x);
+                }
+                open |= asked & (umb_fv_load(tile->z + at) < z);
+            }
+            if (umb_iv_any(open)) {
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+const umb_raster_kernels KERNELS = {ISA,         hides,       hides_rect,  merge,
+                                    find_convex, fill_convex, hides_convex};
