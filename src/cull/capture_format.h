@@ -6,11 +6,11 @@
 #include <stdint.h>
 
 #define UMB_CAPTURE_MAGIC "UMBCAP\r\n" /* a transfer as text destroys the line end */
-#define UMB_CAPTURE_VERSION 1u
+#define UMB_CAPTURE_VERSION 2u
 
 /* Sections in the order of the file and the bytes of a record of each. */
 #define UMB_CAPTURE_SECTIONS(X) \
-    X(FRAME, 536)               \
+    X(FRAME, 560)               \
     X(MESHES, 8)                \
     X(POSITIONS, 12)            \
     X(TRIANGLES, 12)            \

@@ -124,6 +124,7 @@ static umb_result read_frame(loader *l)
     get_doubles(l, v->right, 3);
     get_doubles(l, v->up, 3);
     get_doubles(l, v->forward, 3);
+    get_doubles(l, v->vertical, 3);
     get_doubles(l, numbers, 8);
     get_doubles(l, v->planes[0], 4 * UMB_MAX_CLIP_PLANES);
     for (int i = 0; i < 8; ++i) {

@@ -124,6 +124,7 @@ static void put_frame(saver *s)
     put_doubles(s, v->right, 3);
     put_doubles(s, v->up, 3);
     put_doubles(s, v->forward, 3);
+    put_doubles(s, v->vertical, 3);
     const double numbers[8] = {v->x_min,      v->x_max,     v->y_min,      v->y_max,
                                v->near_depth, v->far_depth, v->min_pixels, v->time};
     put_doubles(s, numbers, 8);
