@@ -306,14 +306,29 @@ UMB_INLINE umb_iv umb_iv_or_fours(umb_iv v)
 #endif
 }
 
+/* Part i of eight lanes of which the first four are a and the last four b. */
+UMB_INLINE umb_fv umb_fv_fours(float a, float b, int i)
+{
+#if UMB_LANES == 8
+    (void)i;
+    return __builtin_shufflevector(umb_fv_set(a), umb_fv_set(b), 0, 1, 2, 3, 8, 9, 10, 11);
+#else
+    return umb_fv_set(i == 0 ? a : b);
+#endif
+}
+
 /* Across lanes. */
 UMB_INLINE float umb_fv_least(umb_fv v)
 {
-    float least = v[0];
-    for (int i = 1; i < UMB_LANES; ++i) {
-        least = v[i] < least ? v[i] : least;
-    }
-    return least;
+#if UMB_LANES == 8
+    v = umb_fv_min(v, __builtin_shufflevector(v, v, 4, 5, 6, 7, 0, 1, 2, 3));
+    v = umb_fv_min(v, __builtin_shufflevector(v, v, 2, 3, 0, 1, 6, 7, 4, 5));
+    v = umb_fv_min(v, __builtin_shufflevector(v, v, 1, 0, 3, 2, 5, 4, 7, 6));
+#else
+    v = umb_fv_min(v, __builtin_shufflevector(v, v, 2, 3, 0, 1));
+    v = umb_fv_min(v, __builtin_shufflevector(v, v, 1, 0, 3, 2));
+#endif
+    return v[0];
 }
 
 UMB_INLINE double umb_dv_least(umb_dv v)

@@ -166,6 +166,22 @@ static bool too_small(walk *w, const umb_node *node, uint32_t slot)
     return small;
 }
 
+/* What waits is wanted soon: have it brought into the cache. */
+static void fetch(const walk *w, uint32_t ref)
+{
+    uint32_t number = ref & UMB_REF_NUMBER;
+    if ((ref & UMB_REF_KIND) == UMB_REF_NODE) {
+        const char *p = (const char *)&w->tree->nodes[number];
+        for (size_t i = 0; i < sizeof(umb_node); i += 64) {
+            __builtin_prefetch(p + i);
+        }
+    } else if ((ref & UMB_REF_KIND) == UMB_REF_OBJECT) {
+        const char *p = (const char *)&w->scene->objects[number];
+        __builtin_prefetch(p);
+        __builtin_prefetch(p + sizeof(umb_object) - 1);
+    }
+}
+
 static void push(walk *w, const umb_node *node, const umb_projected *p, uint32_t slot, uint16_t planes)
 {
     umb_heap *heap = &w->culler->heap;
@@ -185,6 +201,7 @@ static void push(walk *w, const umb_node *node, const umb_projected *p, uint32_t
     item->testable = (p->testable >> slot & 1u) != 0;
     item->waited = false;
     umb_heap_push(heap, item->nearest, taken);
+    fetch(w, item->ref);
 }
 
 static void open_node(walk *w, uint32_t number, uint16_t planes)
@@ -270,7 +287,7 @@ static bool visit_object(walk *w, umb_waiting *item, const umb_heap_entry *entry
     const umb_object *o = &w->scene->objects[item->ref & UMB_REF_NUMBER];
     bool first = !item->waited, hides = o->occluder != UMB_NONE;
     bool can_wait = w->culler->ops != NULL;
-    bool settled = !can_wait || !(item->settled > entry->key);
+    bool settled = !can_wait || !(item->settled > umb_heap_key(entry));
     bool ask = hides ? first || item->stamp != w->drawn : !first || settled;
     item->waited = true;
     if (ask && !object_shows(w, o, item)) {
@@ -280,7 +297,7 @@ static bool visit_object(walk *w, umb_waiting *item, const umb_heap_entry *entry
     if (first) {
         draw(w, o->occluder, item);
     }
-    if (!can_wait || !(item->settled > entry->key)) { /* asking may have moved it either way */
+    if (!can_wait || !(item->settled > umb_heap_key(entry))) { /* asking may have moved it either way */
         report(w, item);
         return false;
     }

@@ -3,7 +3,10 @@
 #ifndef UMB_HEAP_H
 #define UMB_HEAP_H
 
+#include <string.h>
+
 #include "base/memory.h"
+#include "index/tree.h"
 #include "occlusion/method.h"
 
 typedef struct umb_waiting {
@@ -18,10 +21,10 @@ typedef struct umb_waiting {
     bool waited;     /* objects: its turn has come before; now it waits until it is settled */
 } umb_waiting;
 
-/* What the heap moves about: its order, and where the rest is. */
+/* What the heap moves about: its order, and where the rest is. The order holds, from the top bits down, the W
+ * at which its turn comes, its rank (nodes, then occluders, then objects), and its number. */
 typedef struct umb_heap_entry {
-    float key; /* the W at which its turn comes */
-    uint32_t ref;
+    uint64_t order;
     uint32_t slot;
 } umb_heap_entry;
 
@@ -33,19 +36,28 @@ typedef struct umb_heap {
     size_t entry_capacity, slot_capacity, free_capacity;
 } umb_heap;
 
-static inline uint32_t umb_waiting_rank(uint32_t ref)
+/* Orders like the float does; -0 before 0. */
+static inline uint32_t umb_heap_bits(float key)
 {
-    /* Kinds: node 0, object 1, occluder 2. Rank: node 0, occluder 1, object 2. */
-    return (0x18u >> (ref >> 29 & 6u)) & 3u;
+    uint32_t bits;
+    memcpy(&bits, &key, sizeof bits);
+    return (bits & 0x80000000u) != 0 ? ~bits : bits | 0x80000000u;
 }
 
-static inline bool umb_heap_before(const umb_heap_entry *a, const umb_heap_entry *b)
+static inline float umb_heap_key(const umb_heap_entry *e)
 {
-    if (a->key != b->key) {
-        return a->key < b->key;
-    }
-    uint32_t ra = umb_waiting_rank(a->ref), rb = umb_waiting_rank(b->ref);
-    return ra != rb ? ra < rb : a->ref < b->ref;
+    uint32_t bits = (uint32_t)(e->order >> 32);
+    bits = (bits & 0x80000000u) != 0 ? bits & 0x7FFFFFFFu : ~bits;
+    float key;
+    memcpy(&key, &bits, sizeof key);
+    return key;
+}
+
+static inline uint64_t umb_heap_order(float key, uint32_t ref)
+{
+    /* Kinds: node 0, object 1, occluder 2. Rank: node 0, occluder 1, object 2. */
+    uint32_t rank = (0x18u >> (ref >> 29 & 6u)) & 3u;
+    return (uint64_t)umb_heap_bits(key) << 32 | rank << 30 | (ref & UMB_REF_NUMBER);
 }
 
 bool umb_heap_reserve(umb_heap *h, const umb_allocator *a, size_t count);

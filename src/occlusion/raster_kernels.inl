@@ -472,14 +472,10 @@ typedef struct row_planes {
 static inline void place_planes(const umb_convex *v, const double *edge, bool upper, row_planes *out)
 {
     const float y[3] = {(float)edge[0], (float)edge[4], (float)edge[8]};
-    float high[8], deep[8];
-    for (int s = 0; s < 8; ++s) {
-        high[s] = y[s / 4];
-        deep[s] = y[s / 4 + 1];
-    }
     for (uint32_t k = 0; k < v->plane_count; ++k) {
         for (int i = 0; i < UMB_PARTS; ++i) {
-            umb_fv row = umb_fv_load(((v->gy[k] < 0.0f) != upper ? deep : high) + i * UMB_LANES);
+            const float *end = (v->gy[k] < 0.0f) != upper ? y + 1 : y;
+            umb_fv row = umb_fv_fours(end[0], end[1], i);
             umb_fv column = umb_fv_load(SUB_X + i * UMB_LANES) + ((v->gx[k] < 0.0f) != upper ? 8.0f : 0.0f);
             out->at[k][i] = ((upper ? v->high[k] : v->low[k]) + v->gy[k] * row) + v->gx[k] * column;
         }
