@@ -41,33 +41,35 @@ foreach(library umb_truth umb_io)
 endforeach()
 list(APPEND UMB_INSIDE umbrage_inside)
 
-include(cmake/tests.cmake)
+# bench/compare: the library beside its rivals, in a library that is tested, and one program. The rivals get
+# what makes them fast, loose floats included; bench/yardstick_ISA.c has its instruction set's flags, as the
+# core's kernels have.
+file(GLOB UMB_COMPARE_SOURCES CONFIGURE_DEPENDS bench/compare/*.c)
+list(FILTER UMB_COMPARE_SOURCES EXCLUDE REGEX "/compare\\.c$")
+add_library(umb_compare STATIC EXCLUDE_FROM_ALL ${UMB_COMPARE_SOURCES} bench/yardstick.c bench/yardstick_avx2.c)
+target_include_directories(umb_compare PUBLIC bench PRIVATE tools)
+target_link_libraries(umb_compare PUBLIC ${UMB_INSIDE} PRIVATE PkgConfig::JANSSON PkgConfig::XXHASH
+                      ${EMBREE_LIBRARY} m)
+set(UMB_RIVAL_FLAGS -O3 -fno-trapping-math -fno-signed-zeros -ffinite-math-only)
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64)$")
+  list(APPEND UMB_RIVAL_FLAGS -mavx2 -mfma)
+  set_source_files_properties(bench/yardstick_avx2.c PROPERTIES COMPILE_OPTIONS "-O3;-mavx2")
+endif()
+foreach(rival screen_boxes zbuffer zbuffer_tree ray_buffer)
+  set_source_files_properties(bench/compare/${rival}.c PROPERTIES COMPILE_OPTIONS "${UMB_RIVAL_FLAGS}")
+endforeach()
 
-# bench/yardstick_ISA.c has its instruction set's flags, as the core's kernels have; bench/bench_NAME.c
-# is one program, bench/compare/ another. Its rivals get what makes them fast, loose floats included.
+include(cmake/tests.cmake)
+target_link_libraries(test_compare PRIVATE umb_compare)
+
+# bench/bench_NAME.c is one program.
 if(UMB_BENCH)
-  add_library(umb_yardstick STATIC bench/yardstick.c bench/yardstick_avx2.c)
-  if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64)$")
-    set_source_files_properties(bench/yardstick_avx2.c PROPERTIES COMPILE_OPTIONS "-O3;-mavx2")
-  endif()
-  file(GLOB UMB_BENCH_SOURCES CONFIGURE_DEPENDS bench/bench_*.c)
+  file(GLOB UMB_BENCH_SOURCES CONFIGURE_DEPENDS bench/bench_*.c bench/compare/compare.c)
   foreach(source ${UMB_BENCH_SOURCES})
     get_filename_component(name ${source} NAME_WE)
     add_executable(${name} ${source})
     target_include_directories(${name} PRIVATE src tools)
-    target_link_libraries(${name} PRIVATE umb_yardstick ${UMB_INSIDE} PkgConfig::JANSSON m)
+    target_link_libraries(${name} PRIVATE umb_compare ${UMB_INSIDE} m)
     set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bench)
   endforeach()
-  file(GLOB UMB_COMPARE_SOURCES CONFIGURE_DEPENDS bench/compare/*.c)
-  set(UMB_RIVAL_FLAGS -O3 -fno-trapping-math -fno-signed-zeros -ffinite-math-only)
-  if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64)$")
-    list(APPEND UMB_RIVAL_FLAGS -mavx2 -mfma)
-  endif()
-  set_source_files_properties(bench/compare/screen_boxes.c bench/compare/zbuffer.c
-                              bench/compare/ray_buffer.c PROPERTIES COMPILE_OPTIONS "${UMB_RIVAL_FLAGS}")
-  add_executable(compare ${UMB_COMPARE_SOURCES})
-  target_include_directories(compare PRIVATE src tools bench)
-  target_link_libraries(compare PRIVATE umb_yardstick ${UMB_INSIDE} PkgConfig::JANSSON PkgConfig::XXHASH
-                        ${EMBREE_LIBRARY} m)
-  set_target_properties(compare PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bench)
 endif()

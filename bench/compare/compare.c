@@ -70,7 +70,7 @@ static const scene_case generated[] = {
      .occluders = UINT32_MAX,
      .width = 1920,
      .rounds = 5,
-     .sets = {{.name = "path", .every = 8},
+     .sets = {{.name = "path", .every = 2},
               {.name = "walking", .frames = 120, .speed = 1.5},
               {.name = "running", .frames = 120, .speed = 6.0},
               {.name = "jumping", .frames = 120}}},

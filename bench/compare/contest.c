@@ -324,8 +324,9 @@ bool contest_moved(contest *out, const world *w, const cameras *c, const item_bu
         commit[v] = cull[v] = HUGE_VAL;
     }
     for (uint32_t round = 0; ok && round < rounds; ++round) {
+        /* Views change places from round to round, and no frame finds everything where it shall be. */
+        ok = move_all(&m, w, round % 2 == 0) && umb_scene_commit(m.scene) == UMB_OK;
         for (uint32_t v = 0; ok && v < c->count; ++v) {
-            /* An even number of views would give every view the same place in all rounds. */
             bool away = (v + round) % 2 != 0;
             home += !away;
             ok = moved_frame(row, &m, w, c, v, away, truth, stamp, ++frame, &commit[v], &cull[v]);

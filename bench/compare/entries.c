@@ -4,7 +4,7 @@
 #include <stdlib.h>
 
 #include "ray_buffer.h"
-#include "zbuffer.h"
+#include "zbuffer_tree.h"
 
 typedef struct umbrage_row {
     const char *name;
@@ -35,11 +35,13 @@ typedef struct zbuffer_row {
     const char *name;
     uint32_t why;
     uint32_t width, height;
+    bool tree;
 } zbuffer_row;
 
 static const zbuffer_row zbuffer_rows[] = {
-    {"z-buffer 1920x1080", ALL, 1920, 1080},
-    {"z-buffer 512x256", ALL, 512, 256},
+    {"z-buffer 1920x1080", ALL, 1920, 1080, false},
+    {"z-buffer 512x256", ALL, 512, 256, false},
+    {"z-buffer 512x256, tree", ALL, 512, 256, true},
 };
 
 typedef struct ray_row {
@@ -105,6 +107,30 @@ static void destroy_zbuffer(void *self)
     zbuffer_destroy(self);
 }
 
+static uint32_t frame_of_tree(void *self, const umb_view *view, const uint32_t **objects)
+{
+    return zbuffer_tree_frame(self, view, objects);
+}
+
+static void destroy_tree(void *self)
+{
+    zbuffer_tree_destroy(self);
+}
+
+static bool make_zbuffer(const world *w, const zbuffer_row *row, entry *out)
+{
+    *out = (entry){.name = row->name,
+                   .about = "samples",
+                   .frame = row->tree ? frame_of_tree : frame_of_zbuffer,
+                   .destroy = row->tree ? destroy_tree : destroy_zbuffer};
+    if (row->tree) {
+        out->self = zbuffer_tree_create(w, row->width, row->height);
+    } else {
+        out->self = zbuffer_create(w, row->width, row->height);
+    }
+    return out->self != NULL;
+}
+
 static uint32_t frame_of_rays(void *self, const umb_view *view, const uint32_t **objects)
 {
     return ray_buffer_frame(self, view, objects);
@@ -145,13 +171,7 @@ uint32_t entries_make(const world *w, uint32_t why, entry out[ENTRIES_MOST])
     }
     for (size_t i = 0; ok && i < COUNT(zbuffer_rows); ++i) {
         if (zbuffer_rows[i].why & why) {
-            zbuffer *z = zbuffer_create(w, zbuffer_rows[i].width, zbuffer_rows[i].height);
-            out[count++] = (entry){.name = zbuffer_rows[i].name,
-                                   .about = "samples",
-                                   .self = z,
-                                   .frame = frame_of_zbuffer,
-                                   .destroy = destroy_zbuffer};
-            ok = z != NULL;
+            ok = make_zbuffer(w, &zbuffer_rows[i], &out[count++]);
         }
     }
     for (size_t i = 0; ok && i < COUNT(ray_rows); ++i) {

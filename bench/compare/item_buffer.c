@@ -351,7 +351,7 @@ uint32_t item_buffer_confirm(const world *w, const umb_view *view, const uint8_t
     truth *t = truth_create(w->model, &error);
     uint32_t confirmed = UINT32_MAX;
     truth_options options = {
-        .grid_width = 1920, .grid_height = 1080, .accused = hidden, .threads = 1};
+        .grid_width = 640, .grid_height = 360, .accused = hidden, .threads = 1};
     if (t != NULL && truth_view(t, view, &options, &result, &error)) {
         confirmed = 0;
         for (uint32_t i = 0; i < w->model->object_count; ++i) {

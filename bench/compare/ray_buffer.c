@@ -15,7 +15,6 @@ struct ray_buffer {
     RTCScene scene;
     screen_lens lens;
     screen_boxes boxes;
-    uint32_t *indices; /* of all occluders in one soup */
     float *level[LEVELS];
     uint32_t level_width[LEVELS], level_height[LEVELS];
     uint32_t levels;
@@ -29,7 +28,7 @@ static RTCScene build(ray_buffer *r, enum RTCBuildQuality quality)
     RTCGeometry g = rtcNewGeometry(r->device, RTC_GEOMETRY_TYPE_TRIANGLE);
     rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, w->vertices, 0, 12,
                                w->vertex_count);
-    rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, r->indices, 0, 12,
+    rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, w->indices, 0, 12,
                                w->triangle_count);
     rtcSetGeometryBuildQuality(g, quality);
     rtcCommitGeometry(g);
@@ -48,10 +47,8 @@ ray_buffer *ray_buffer_create(const world *w, uint32_t width, uint32_t height)
     }
     r->world = w;
     r->device = rtcNewDevice("threads=1");
-    r->indices = malloc(((size_t)w->triangle_count + 1) * 3 * sizeof(uint32_t));
     r->visible = malloc(((size_t)w->box_count + 1) * sizeof(uint32_t));
-    bool ok = r->device != NULL && r->indices != NULL && r->visible != NULL &&
-              screen_boxes_make(&r->boxes, w);
+    bool ok = r->device != NULL && r->visible != NULL && screen_boxes_make(&r->boxes, w);
     uint32_t wide = width;
     uint32_t high = height;
     for (bool more = true; ok && more && r->levels < LEVELS; ++r->levels) {
@@ -66,13 +63,6 @@ ray_buffer *ray_buffer_create(const world *w, uint32_t width, uint32_t height)
     if (!ok) {
         ray_buffer_destroy(r);
         return NULL;
-    }
-    for (uint32_t i = 0; i < w->occluder_count; ++i) {
-        const world_occluder *o = &w->occluders[i];
-        for (size_t k = 0; k < 3 * (size_t)o->triangle_count; ++k) {
-            size_t at = 3 * (size_t)o->first_triangle + k;
-            r->indices[at] = o->first_vertex + w->indices[at];
-        }
     }
     r->scene = build(r, RTC_BUILD_QUALITY_MEDIUM);
     return r;
@@ -93,7 +83,6 @@ void ray_buffer_destroy(ray_buffer *r)
         free(r->level[k]);
     }
     screen_boxes_free(&r->boxes);
-    free(r->indices);
     free(r->visible);
     free(r);
 }

@@ -6,7 +6,7 @@
 
 #include "yardstick.h"
 
-enum { LANES = 8 };
+enum { LANES = SCREEN_LANES };
 
 void screen_lens_make(screen_lens *lens, const umb_view *view, uint32_t width, uint32_t height)
 {
@@ -106,28 +106,24 @@ static inline float corner(const products *p, int k, int j)
            (k & 4 ? p->high[2][j] : p->low[2][j]);
 }
 
-static void project(screen_boxes *s, const world *w, const screen_lens *lens, uint32_t at)
+void screen_boxes_project(const screen_lens *lens, const float box[6][LANES], screen_rects *out)
 {
     float d[6][LANES];
     products px;
     products py;
     products pw;
-    float x_min[LANES];
-    float x_max[LANES];
-    float y_min[LANES];
-    float y_max[LANES];
-    float nearest[LANES];
+    screen_rects r;
     for (int k = 0; k < 6; ++k) {
         for (int j = 0; j < LANES; ++j) {
-            d[k][j] = w->box[k][s->box[at + (uint32_t)j]] - lens->eye[k % 3];
+            d[k][j] = box[k][j] - lens->eye[k % 3];
         }
     }
     multiply(&px, lens->x, d);
     multiply(&py, lens->y, d);
     multiply(&pw, lens->w, d);
     for (int j = 0; j < LANES; ++j) {
-        x_min[j] = y_min[j] = nearest[j] = 1e30f;
-        x_max[j] = y_max[j] = -1e30f;
+        r.x_min[j] = r.y_min[j] = r.nearest[j] = 1e30f;
+        r.x_max[j] = r.y_max[j] = -1e30f;
     }
     for (int k = 0; k < 8; ++k) {
         for (int j = 0; j < LANES; ++j) {
@@ -135,20 +131,57 @@ static void project(screen_boxes *s, const world *w, const screen_lens *lens, ui
             float inverse = 1.0f / depth;
             float x = corner(&px, k, j) * inverse;
             float y = corner(&py, k, j) * inverse;
-            nearest[j] = depth < nearest[j] ? depth : nearest[j];
-            x_min[j] = x < x_min[j] ? x : x_min[j];
-            x_max[j] = x > x_max[j] ? x : x_max[j];
-            y_min[j] = y < y_min[j] ? y : y_min[j];
-            y_max[j] = y > y_max[j] ? y : y_max[j];
+            r.nearest[j] = depth < r.nearest[j] ? depth : r.nearest[j];
+            r.x_min[j] = x < r.x_min[j] ? x : r.x_min[j];
+            r.x_max[j] = x > r.x_max[j] ? x : r.x_max[j];
+            r.y_min[j] = y < r.y_min[j] ? y : r.y_min[j];
+            r.y_max[j] = y > r.y_max[j] ? y : r.y_max[j];
         }
     }
     for (int j = 0; j < LANES; ++j) {
-        s->x_min[at + (uint32_t)j] = x_min[j] + lens->centre[0];
-        s->x_max[at + (uint32_t)j] = x_max[j] + lens->centre[0];
-        s->y_min[at + (uint32_t)j] = y_min[j] + lens->centre[1];
-        s->y_max[at + (uint32_t)j] = y_max[j] + lens->centre[1];
-        s->nearest[at + (uint32_t)j] = nearest[j];
+        out->x_min[j] = r.x_min[j] + lens->centre[0];
+        out->x_max[j] = r.x_max[j] + lens->centre[0];
+        out->y_min[j] = r.y_min[j] + lens->centre[1];
+        out->y_max[j] = r.y_max[j] + lens->centre[1];
+        out->nearest[j] = r.nearest[j];
     }
+}
+
+uint32_t screen_boxes_inside(const screen_lens *lens, const float box[6][LANES])
+{
+    uint32_t inside[LANES] = {1, 2, 4, 8, 16, 32, 64, 128};
+    uint32_t bits = 0;
+    for (int k = 0; k < 6; ++k) {
+        const float *p = lens->planes[k];
+        const float *x = box[p[0] < 0.0f ? 0 : 3];
+        const float *y = box[p[1] < 0.0f ? 1 : 4];
+        const float *z = box[p[2] < 0.0f ? 2 : 5];
+        for (int j = 0; j < LANES; ++j) {
+            float g = x[j] * p[0] + y[j] * p[1] + z[j] * p[2] + p[3];
+            inside[j] = g < 0.0f ? 0u : inside[j];
+        }
+    }
+    for (int j = 0; j < LANES; ++j) {
+        bits |= inside[j];
+    }
+    return bits;
+}
+
+static void project(screen_boxes *s, const world *w, const screen_lens *lens, uint32_t at)
+{
+    float box[6][LANES];
+    screen_rects r;
+    for (int k = 0; k < 6; ++k) {
+        for (uint32_t j = 0; j < LANES; ++j) {
+            box[k][j] = w->box[k][s->box[at + j]];
+        }
+    }
+    screen_boxes_project(lens, (const float(*)[LANES])box, &r);
+    memcpy(s->x_min + at, r.x_min, sizeof r.x_min);
+    memcpy(s->x_max + at, r.x_max, sizeof r.x_max);
+    memcpy(s->y_min + at, r.y_min, sizeof r.y_min);
+    memcpy(s->y_max + at, r.y_max, sizeof r.y_max);
+    memcpy(s->nearest + at, r.nearest, sizeof r.nearest);
 }
 
 void screen_boxes_frame(screen_boxes *s, const world *w, const screen_lens *lens)

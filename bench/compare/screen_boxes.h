@@ -17,6 +17,20 @@ typedef struct screen_lens {
 
 void screen_lens_make(screen_lens *lens, const umb_view *view, uint32_t width, uint32_t height);
 
+enum { SCREEN_LANES = 8 };
+
+/* Where eight boxes lie in the picture, in pixels, not clamped, and the view depth of the nearest corner. A box
+ * that reaches behind the near plane has no rectangle, only a nearest depth below the near plane's. */
+typedef struct screen_rects {
+    float x_min[SCREEN_LANES], x_max[SCREEN_LANES], y_min[SCREEN_LANES], y_max[SCREEN_LANES];
+    float nearest[SCREEN_LANES];
+} screen_rects;
+
+void screen_boxes_project(const screen_lens *lens, const float box[6][SCREEN_LANES],
+                          screen_rects *out);
+/* A bit for each box that is not outside one of the planes. */
+uint32_t screen_boxes_inside(const screen_lens *lens, const float box[6][SCREEN_LANES]);
+
 /* One array a component, room to the next multiple of eight. */
 typedef struct screen_boxes {
     uint8_t *mask;                        /* a bit for each box of the world */

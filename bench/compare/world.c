@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
+#include <xxhash.h>
 
 double world_clock(void)
 {
@@ -51,36 +52,65 @@ static bool list_boxes(world *w)
     return ok;
 }
 
-static uint32_t blocking_triangles(const model_mesh *mesh)
+/* Triangles met so far, by their corners: levels give a face to every part of the level that it
+ * reaches into, and it need be drawn once only. */
+typedef struct seen_triangles {
+    uint32_t *slots; /* triangle + 1; 0: free */
+    size_t mask;
+} seen_triangles;
+
+static void corners_of(const world *w, const uint32_t index[3], float out[9])
 {
-    uint32_t count = 0;
-    for (uint32_t k = 0; k < mesh->triangle_count; ++k) {
-        count += (mesh->flags[k] & UMB_TRIANGLE_OPEN) == 0;
+    const float *p[3];
+    uint32_t first = 0;
+    for (uint32_t i = 0; i < 3; ++i) {
+        p[i] = w->vertices + 3 * (size_t)index[i];
+        first = memcmp(p[i], p[first], 12) < 0 ? i : first;
     }
-    return count;
+    for (uint32_t i = 0; i < 3; ++i) {
+        memcpy(out + (size_t)3 * i, p[(first + i) % 3], 12);
+    }
 }
 
-static void add_occluder(world *w, uint32_t box, uint32_t blocking)
+/* Is the triangle that would come next there already? If not, it is noted. */
+static bool seen_before(const world *w, seen_triangles *seen, const uint32_t index[3])
+{
+    float own[9];
+    float other[9];
+    corners_of(w, index, own);
+    size_t slot = XXH64(own, sizeof own, 0) & seen->mask;
+    for (; seen->slots[slot] != 0; slot = (slot + 1) & seen->mask) {
+        corners_of(w, w->indices + 3 * (size_t)(seen->slots[slot] - 1), other);
+        if (memcmp(own, other, sizeof own) == 0) {
+            return true;
+        }
+    }
+    seen->slots[slot] = w->triangle_count + 1;
+    return false;
+}
+
+static void add_occluder(world *w, uint32_t box, seen_triangles *seen)
 {
     const model_object *o = &w->model->objects[w->box_object[box]];
     const model_mesh *mesh = &w->model->meshes[o->mesh];
     bool mirrored = model_mirrored(o);
-    w->occluders[w->occluder_count++] = (world_occluder){box, w->vertex_count, mesh->position_count,
-                                                         w->triangle_count, blocking};
+    world_occluder *out = &w->occluders[w->occluder_count];
+    *out = (world_occluder){box, w->vertex_count, mesh->position_count, w->triangle_count, 0};
     for (uint32_t v = 0; v < mesh->position_count; ++v) {
         model_world_vertex(w->model, o, v, w->vertices + 3 * (size_t)w->vertex_count++);
     }
     for (uint32_t k = 0; k < mesh->triangle_count; ++k) {
-        if (mesh->flags[k] & UMB_TRIANGLE_OPEN) {
-            continue;
-        }
         const uint32_t *from = mesh->indices + 3 * (size_t)k;
         uint32_t *to = w->indices + 3 * (size_t)w->triangle_count;
-        to[0] = from[0];
-        to[1] = from[mirrored ? 2 : 1];
-        to[2] = from[mirrored ? 1 : 2];
-        w->two_sided[w->triangle_count++] = (mesh->flags[k] & UMB_TRIANGLE_TWO_SIDED) != 0;
+        to[0] = out->first_vertex + from[0];
+        to[1] = out->first_vertex + from[mirrored ? 2 : 1];
+        to[2] = out->first_vertex + from[mirrored ? 1 : 2];
+        if ((mesh->flags[k] & UMB_TRIANGLE_OPEN) == 0 && !seen_before(w, seen, to)) {
+            w->two_sided[w->triangle_count++] = (mesh->flags[k] & UMB_TRIANGLE_TWO_SIDED) != 0;
+        }
     }
+    out->triangle_count = w->triangle_count - out->first_triangle;
+    w->occluder_count += out->triangle_count != 0;
 }
 
 static bool list_occluders(world *w, uint32_t occluder_objects)
@@ -93,20 +123,22 @@ static bool list_occluders(world *w, uint32_t occluder_objects)
         vertices += mesh->position_count;
         triangles += mesh->triangle_count;
     }
-    w->occluders = room(w->box_count, sizeof *w->occluders);
+    seen_triangles seen = {NULL, 1023};
+    while (seen.mask < 2 * triangles) {
+        seen.mask = 2 * seen.mask + 1;
+    }
+    seen.slots = calloc(seen.mask + 1, sizeof(uint32_t));
+    w->occluders = room((size_t)w->box_count + 1, sizeof *w->occluders);
     w->vertices = room(3 * vertices + 4, sizeof(float));
-    w->indices = room(3 * triangles, sizeof(uint32_t));
+    w->indices = room(3 * triangles + 3, sizeof(uint32_t));
     w->two_sided = room(triangles, 1);
-    if (w->occluders == NULL || w->vertices == NULL || w->indices == NULL || w->two_sided == NULL) {
-        return false;
+    bool ok = seen.slots != NULL && w->occluders != NULL && w->vertices != NULL &&
+              w->indices != NULL && w->two_sided != NULL;
+    for (uint32_t b = 0; ok && b < w->box_count && w->box_object[b] < occluder_objects; ++b) {
+        add_occluder(w, b, &seen);
     }
-    for (uint32_t b = 0; b < w->box_count && w->box_object[b] < occluder_objects; ++b) {
-        uint32_t blocking = blocking_triangles(&m->meshes[m->objects[w->box_object[b]].mesh]);
-        if (blocking != 0) {
-            add_occluder(w, b, blocking);
-        }
-    }
-    return true;
+    free(seen.slots);
+    return ok;
 }
 
 static bool make_indices(world *w)

@@ -25,7 +25,7 @@ typedef struct world {
     uint32_t occluder_count;
     float *vertices; /* 3 each, world space */
     uint32_t vertex_count;
-    uint32_t *indices;  /* 3 each, from the occluder's first vertex */
+    uint32_t *indices;  /* 3 each, into vertices; no triangle is there twice */
     uint8_t *two_sided; /* per triangle */
     uint32_t triangle_count;
 } world;

@@ -8,7 +8,7 @@
 
 #include "lanes.h"
 
-enum { TILE = 8 };
+enum { TILE = 8, MANY_TRIANGLES = 16 };
 
 typedef struct corner3 {
     float x, y, w;
@@ -25,8 +25,8 @@ struct zbuffer {
     uint32_t *order, *scratch; /* occluders, nearest first */
     float *occluder_depth;
     corner3 *corners; /* of one occluder, in the view's axes */
+    bool many;        /* it has many triangles: most of them lie behind others */
     uint32_t *visible;
-    uint32_t drawn;
 };
 
 static void *room(size_t bytes)
@@ -152,6 +152,39 @@ static bool set_up(const float p[3][3], edge e[3], uint32_t *edges, gradient *g)
     return true;
 }
 
+static float tile_bound(zbuffer *z, uint32_t tx, uint32_t ty)
+{
+    size_t t = (size_t)ty * z->tiles_x + tx;
+    if (z->changed[t]) {
+        const float *row = z->depth + (size_t)ty * TILE * z->stride + (size_t)tx * TILE;
+        lanes least = lanes_load(row);
+        for (uint32_t y = 1; y < TILE; ++y) {
+            least = lanes_least(least, lanes_load(row + y * z->stride));
+        }
+        float bound = least[0];
+        for (uint32_t j = 1; j < TILE; ++j) {
+            bound = least[j] < bound ? least[j] : bound;
+        }
+        z->tile[t] = bound;
+        z->changed[t] = 0;
+    }
+    return z->tile[t];
+}
+
+/* Is everything in these pixels nearer already than the triangle's nearest corner? */
+static bool buried(zbuffer *z, uint32_t x_first, uint32_t x_last, uint32_t y_begin, uint32_t y_end,
+                   float most)
+{
+    for (uint32_t ty = y_begin / TILE; ty <= (y_end - 1) / TILE; ++ty) {
+        for (uint32_t tx = x_first / TILE; tx <= (x_last - 1) / TILE; ++tx) {
+            if (tile_bound(z, tx, ty) < most) {
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
 /* p: x, y in pixels and 1 / depth of three corners. */
 static void draw_triangle(zbuffer *z, const float p[3][3])
 {
@@ -166,7 +199,10 @@ static void draw_triangle(zbuffer *z, const float p[3][3])
     uint32_t y_end = clamp_pixel(ceilf(high - 0.5f), z->height);
     uint32_t x_first = clamp_pixel(ceilf(west - 0.5f), z->width);
     uint32_t x_last = clamp_pixel(ceilf(east - 0.5f), z->width);
-    if (y_begin >= y_end || x_first >= x_last || !set_up(p, e, &edges, &g)) {
+    if (y_begin >= y_end || x_first >= x_last ||
+        (z->many &&
+         buried(z, x_first, x_last, y_begin, y_end, fmaxf(p[0][2], fmaxf(p[1][2], p[2][2])))) ||
+        !set_up(p, e, &edges, &g)) {
         return;
     }
     for (uint32_t y = y_begin; y < y_end; ++y) {
@@ -241,6 +277,7 @@ static void draw_occluder(zbuffer *z, const world_occluder *o)
     const world *w = z->world;
     const screen_lens *lens = &z->lens;
     bool crosses = false;
+    z->many = o->triangle_count > MANY_TRIANGLES;
     for (uint32_t v = 0; v < o->vertex_count; ++v) {
         const float *p = w->vertices + 3 * ((size_t)o->first_vertex + v);
         float d[3] = {p[0] - lens->eye[0], p[1] - lens->eye[1], p[2] - lens->eye[2]};
@@ -253,7 +290,9 @@ static void draw_occluder(zbuffer *z, const world_occluder *o)
     for (uint32_t k = 0; k < o->triangle_count; ++k) {
         const uint32_t *index = w->indices + 3 * ((size_t)o->first_triangle + k);
         bool two_sided = w->two_sided[o->first_triangle + k];
-        const corner3 *c[3] = {&z->corners[index[0]], &z->corners[index[1]], &z->corners[index[2]]};
+        const corner3 *c[3] = {&z->corners[index[0] - o->first_vertex],
+                               &z->corners[index[1] - o->first_vertex],
+                               &z->corners[index[2] - o->first_vertex]};
         float p[3][3];
         if (crosses && (c[0]->w < lens->near_depth || c[1]->w < lens->near_depth ||
                         c[2]->w < lens->near_depth)) {
@@ -267,25 +306,6 @@ static void draw_occluder(zbuffer *z, const world_occluder *o)
             draw_triangle(z, (const float(*)[3])p);
         }
     }
-}
-
-static float tile_bound(zbuffer *z, uint32_t tx, uint32_t ty)
-{
-    size_t t = (size_t)ty * z->tiles_x + tx;
-    if (z->changed[t]) {
-        const float *row = z->depth + (size_t)ty * TILE * z->stride + (size_t)tx * TILE;
-        lanes least = lanes_load(row);
-        for (uint32_t y = 1; y < TILE; ++y) {
-            least = lanes_least(least, lanes_load(row + y * z->stride));
-        }
-        float bound = least[0];
-        for (uint32_t j = 1; j < TILE; ++j) {
-            bound = least[j] < bound ? least[j] : bound;
-        }
-        z->tile[t] = bound;
-        z->changed[t] = 0;
-    }
-    return z->tile[t];
 }
 
 typedef struct rectangle {
@@ -310,31 +330,19 @@ static bool tile_hides(const zbuffer *z, const rectangle *r, uint32_t tx, uint32
     return true;
 }
 
-/* False when the box lies beside the picture. */
-static bool rectangle_of(const zbuffer *z, uint32_t place, rectangle *r)
+bool zbuffer_hides(zbuffer *z, const zbuffer_box *box)
 {
-    const screen_boxes *s = &z->boxes;
-    if (!(s->x_max[place] >= 0.0f && s->y_max[place] >= 0.0f && s->x_min[place] < (float)z->width &&
-          s->y_min[place] < (float)z->height)) {
+    if (box->nearest < z->lens.near_depth) {
         return false;
     }
-    r->x0 = clamp_pixel(s->x_min[place], z->width - 1);
-    r->x1 = clamp_pixel(s->x_max[place], z->width - 1);
-    r->y0 = clamp_pixel(s->y_min[place], z->height - 1);
-    r->y1 = clamp_pixel(s->y_max[place], z->height - 1);
-    return true;
-}
-
-static bool hidden(zbuffer *z, uint32_t place)
-{
-    rectangle r;
-    if (z->boxes.nearest[place] < z->lens.near_depth) {
-        return false;
+    if (!(box->x_max >= 0.0f && box->y_max >= 0.0f && box->x_min < (float)z->width &&
+          box->y_min < (float)z->height)) {
+        return true; /* beside the picture */
     }
-    if (!rectangle_of(z, place, &r)) {
-        return true;
-    }
-    float inverse = 1.0f / z->boxes.nearest[place];
+    const rectangle r = {
+        clamp_pixel(box->x_min, z->width - 1), clamp_pixel(box->x_max, z->width - 1),
+        clamp_pixel(box->y_min, z->height - 1), clamp_pixel(box->y_max, z->height - 1)};
+    float inverse = 1.0f / box->nearest;
     for (uint32_t ty = r.y0 / TILE; ty <= r.y1 / TILE; ++ty) {
         for (uint32_t tx = r.x0 / TILE; tx <= r.x1 / TILE; ++tx) {
             if (tile_bound(z, tx, ty) <= inverse && !tile_hides(z, &r, tx, ty, inverse)) {
@@ -343,6 +351,14 @@ static bool hidden(zbuffer *z, uint32_t place)
         }
     }
     return true;
+}
+
+static bool hidden(zbuffer *z, uint32_t place)
+{
+    const screen_boxes *s = &z->boxes;
+    const zbuffer_box box = {s->x_min[place], s->x_max[place], s->y_min[place], s->y_max[place],
+                             s->nearest[place]};
+    return zbuffer_hides(z, &box);
 }
 
 static bool in_frustum(const screen_boxes *s, uint32_t box)
@@ -361,22 +377,30 @@ static void draw_all(zbuffer *z)
         }
     }
     screen_boxes_sort(z->occluder_depth, z->order, z->scratch, count);
-    z->drawn = 0;
     for (uint32_t i = 0; i < count; ++i) {
         const world_occluder *o = &w->occluders[z->order[i]];
         if (!hidden(z, z->boxes.place[o->box])) {
             draw_occluder(z, o);
-            ++z->drawn;
         }
     }
+}
+
+const screen_lens *zbuffer_begin(zbuffer *z, const umb_view *view)
+{
+    screen_lens_make(&z->lens, view, z->width, z->height);
+    clear(z);
+    return &z->lens;
+}
+
+void zbuffer_draw(zbuffer *z, uint32_t occluder)
+{
+    draw_occluder(z, &z->world->occluders[occluder]);
 }
 
 uint32_t zbuffer_frame(zbuffer *z, const umb_view *view, const uint32_t **objects)
 {
     uint32_t count = 0;
-    screen_lens_make(&z->lens, view, z->width, z->height);
-    clear(z);
-    screen_boxes_frame(&z->boxes, z->world, &z->lens);
+    screen_boxes_frame(&z->boxes, z->world, zbuffer_begin(z, view));
     draw_all(z);
     for (uint32_t i = 0; i < z->boxes.count; ++i) {
         if (!hidden(z, i)) {
@@ -385,9 +409,4 @@ uint32_t zbuffer_frame(zbuffer *z, const umb_view *view, const uint32_t **object
     }
     *objects = z->visible;
     return count;
-}
-
-uint32_t zbuffer_drawn(const zbuffer *z)
-{
-    return z->drawn;
 }

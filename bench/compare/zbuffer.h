@@ -15,7 +15,14 @@ void zbuffer_destroy(zbuffer *z);
  * until the next frame. */
 uint32_t zbuffer_frame(zbuffer *z, const umb_view *view, const uint32_t **objects);
 
-/* Of the last frame. */
-uint32_t zbuffer_drawn(const zbuffer *z);
+/* The parts of a frame, for other orders of the same work. */
+typedef struct zbuffer_box {
+    float x_min, x_max, y_min, y_max; /* pixels, not clamped */
+    float nearest;                    /* view depth */
+} zbuffer_box;
+
+const screen_lens *zbuffer_begin(zbuffer *z, const umb_view *view);
+bool zbuffer_hides(zbuffer *z, const zbuffer_box *box);
+void zbuffer_draw(zbuffer *z, uint32_t occluder);
 
 #endif
