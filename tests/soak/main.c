@@ -91,9 +91,9 @@ static bool key_of(const soak_part *part, plant planted, uint64_t program, uint6
         return false;
     }
     (void)XXH3_64bits_reset(state);
-    (void)snprintf(text, sizeof text, "%016" PRIx64 " %s %d %u %" PRIu64 " %.17g %d %d", program,
-                   part->scene, (int)part->style, part->most_targets, part->rays, part->shift,
-                   part->weld, (int)planted);
+    (void)snprintf(text, sizeof text, "%016" PRIx64 " %s %d %u %u %" PRIu64 " %.17g %d %d", program,
+                   part->scene, (int)part->style, part->most_targets, part->most_decided,
+                   part->rays, part->shift, part->weld, (int)planted);
     (void)XXH3_64bits_update(state, text, strlen(text));
     bool ok = true;
     if (part->scene[0] == '/' || part->scene[0] == '.') {
@@ -124,9 +124,9 @@ static void print_row(const char *scene, const char *views, const soak_count *c)
 {
     double ratio = c->seen != 0 ? (double)c->reported / (double)c->seen : 0.0;
     printf("| %s | %s | %" PRIu64 " | %" PRIu64 " | %" PRIu64 " | %" PRIu64 " | %.3f | %" PRIu64
-           " | %" PRIu64 " | %.0f | %.3g |\n",
+           " | %" PRIu64 " | %" PRIu64 " | %" PRIu64 " | %.0f | %.3g |\n",
            scene, views, c->views, c->pairs, c->seen, c->reported, ratio, c->wrong, c->unconfirmed,
-           c->seconds, c->seconds > 0.0 ? (double)c->pairs / c->seconds : 0.0);
+           c->proven, c->open, c->seconds, c->seconds > 0.0 ? (double)c->pairs / c->seconds : 0.0);
 }
 
 static const char *style_name(soak_style style)
@@ -140,8 +140,8 @@ static void print_table(const soak_plan *plan, const soak_count *counts)
     soak_count all = {0}, outside = {0}, adversarial = {0};
     puts("| scene | views | | object-view pairs | seen | reported | conservativity | wrongly "
          "hidden | "
-         "unconfirmed | processor seconds | pairs a second |");
-    puts("|---|---|---|---|---|---|---|---|---|---|---|");
+         "unconfirmed | proven hidden | undecided | processor seconds | pairs a second |");
+    puts("|---|---|---|---|---|---|---|---|---|---|---|---|---|");
     for (uint32_t k = 0; k < plan->count; ++k) {
         const soak_part *part = &plan->parts[k];
         soak_count_add(&all, &counts[k]);

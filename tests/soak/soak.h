@@ -24,7 +24,7 @@ typedef struct soak_part {
     const char *family; /* rows of one family are summed */
     soak_style style;
     uint32_t views;
-    uint32_t most_targets;
+    uint32_t most_targets, most_decided;
     uint64_t rays; /* guided ones a view */
     double shift;  /* how many of its own extents the scene is moved away from the origin */
     bool weld;
@@ -69,7 +69,8 @@ const char *soak_view_kind(uint64_t number);
 /* What was counted, over views. seen: objects in view with an exactly confirmed sight-line. */
 typedef struct soak_count {
     uint64_t views, pairs, seen, reported, wrong, unconfirmed, rays;
-    double seconds; /* of one thread each */
+    uint64_t proven, open; /* hidden objects looked at exactly: proven hidden, not decided */
+    double seconds;        /* of one thread each */
 } soak_count;
 
 void soak_count_add(soak_count *sum, const soak_count *c);

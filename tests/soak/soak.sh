@@ -14,7 +14,7 @@ mkdir "$folder"/{a,b,c,d}
 run() {
     local out=$folder/$1 expected=$2 code
     shift 2
-    "$soak" --short --scale "$scale" --out "$out" "$@" 2>"$out/notes" | cut -d '|' -f 1-10
+    "$soak" --short --scale "$scale" --out "$out" "$@" 2>"$out/notes" | cut -d '|' -f 1-12
     code=${PIPESTATUS[0]}
     if [ "$code" != "$expected" ]; then
         cat "$out/notes" >&2

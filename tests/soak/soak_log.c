@@ -14,6 +14,8 @@ void soak_count_add(soak_count *sum, const soak_count *c)
     sum->wrong += c->wrong;
     sum->unconfirmed += c->unconfirmed;
     sum->rays += c->rays;
+    sum->proven += c->proven;
+    sum->open += c->open;
     sum->seconds += c->seconds;
 }
 
@@ -28,10 +30,10 @@ static void take_up(soak_log *log, FILE *f)
         int fields = sscanf(line,
                             "batch %" SCNu32 " views %" SCNu64 " pairs %" SCNu64 " seen %" SCNu64
                             " reported %" SCNu64 " wrong %" SCNu64 " unconfirmed %" SCNu64
-                            " rays %" SCNu64 " seconds %lf .%n",
+                            " rays %" SCNu64 " proven %" SCNu64 " open %" SCNu64 " seconds %lf .%n",
                             &batch, &c.views, &c.pairs, &c.seen, &c.reported, &c.wrong,
-                            &c.unconfirmed, &c.rays, &c.seconds, &end);
-        if (fields == 9 && end > 0 && batch < log->batches && log->done[batch] == 0) {
+                            &c.unconfirmed, &c.rays, &c.proven, &c.open, &c.seconds, &end);
+        if (fields == 11 && end > 0 && batch < log->batches && log->done[batch] == 0) {
             log->done[batch] = 1;
             soak_count_add(&log->sum, &c);
         }
@@ -70,9 +72,9 @@ bool soak_log_add(soak_log *log, uint32_t batch, const soak_count *c)
     ok = ok && fprintf(f,
                        "\nbatch %" PRIu32 " views %" PRIu64 " pairs %" PRIu64 " seen %" PRIu64
                        " reported %" PRIu64 " wrong %" PRIu64 " unconfirmed %" PRIu64
-                       " rays %" PRIu64 " seconds %.3f .\n",
+                       " rays %" PRIu64 " proven %" PRIu64 " open %" PRIu64 " seconds %.3f .\n",
                        batch, c->views, c->pairs, c->seen, c->reported, c->wrong, c->unconfirmed,
-                       c->rays, c->seconds) > 0;
+                       c->rays, c->proven, c->open, c->seconds) > 0;
     ok = (f == NULL || fclose(f) == 0) && ok;
     log->done[batch] = 1;
     soak_count_add(&log->sum, c);

@@ -133,6 +133,7 @@ static bool check(bench *b, const model *m, truth *oracle, const umb_view *view,
                              .guided_rays = part->rays,
                              .accused = b->accused,
                              .most_targets = part->most_targets,
+                             .most_decided = part->most_decided,
                              .threads = 1};
     truth_result r;
     umb_error error = {0};
@@ -146,12 +147,15 @@ static bool check(bench *b, const model *m, truth *oracle, const umb_view *view,
     sum->seen += r.visible;
     sum->reported += reported;
     sum->rays += r.rays;
+    sum->proven += r.decided_hidden;
+    sum->open += r.undecided;
     if (b->print) {
         printf("view %" PRIu64 " (%s): in view %u, seen %u, reported %u, wrong %" PRIu64
-               ", unconfirmed %" PRIu64 ", rays %" PRIu64 ", rounds %u\n",
+               ", unconfirmed %" PRIu64 ", withdrawn %u, proven hidden %u, open %u, rays %" PRIu64
+               ", rounds %u\n",
                number, part->style == SOAK_ORDINARY ? "ordinary" : soak_view_kind(number),
                r.in_view, r.visible, reported, sum->wrong - wrong, sum->unconfirmed - unconfirmed,
-               r.rays, r.rounds);
+               r.withdrawn, r.decided_hidden, r.undecided, r.rays, r.rounds);
     }
     truth_result_free(&r);
     return true;

@@ -146,9 +146,20 @@ static bool segment_meets_box(const double from[3], const double to[3], const um
     return low <= high + 1e-9;
 }
 
+typedef struct segment {
+    const double *from, *to;
+} segment;
+
+static bool on_segment(const void *where, const umb_aabb *box)
+{
+    const segment *s = where;
+    return segment_meets_box(s->from, s->to, box);
+}
+
 typedef struct box_walk {
     const truth *t;
-    const double *from, *to;
+    oracle_meets *meets;
+    const void *where;
     oracle_visit *visit;
     void *user;
     uint32_t node;
@@ -157,7 +168,7 @@ typedef struct box_walk {
 static bool walk(box_walk *w, uint32_t first, uint32_t last)
 {
     const oracle_box_node *n = &w->t->box_nodes[w->node];
-    if (!segment_meets_box(w->from, w->to, &n->box)) {
+    if (!w->meets(w->where, &n->box)) {
         w->node = n->after;
         return true;
     }
@@ -168,7 +179,7 @@ static bool walk(box_walk *w, uint32_t first, uint32_t last)
     }
     for (uint32_t i = first; i < last; ++i) {
         const oracle_chunk *chunk = &w->t->chunks[i];
-        if (segment_meets_box(w->from, w->to, &chunk->box) && !w->visit(w->user, chunk)) {
+        if (w->meets(w->where, &chunk->box) && !w->visit(w->user, chunk)) {
             return false;
         }
     }
@@ -178,6 +189,13 @@ static bool walk(box_walk *w, uint32_t first, uint32_t last)
 bool oracle_boxes_walk(const truth *t, const double from[3], const double to[3],
                        oracle_visit *visit, void *user)
 {
-    box_walk w = {.t = t, .from = from, .to = to, .visit = visit, .user = user};
+    segment s = {from, to};
+    return oracle_boxes_visit(t, on_segment, &s, visit, user);
+}
+
+bool oracle_boxes_visit(const truth *t, oracle_meets *meets, const void *where, oracle_visit *visit,
+                        void *user)
+{
+    box_walk w = {.t = t, .meets = meets, .where = where, .visit = visit, .user = user};
     return t->chunk_count == 0 || walk(&w, 0, t->chunk_count);
 }

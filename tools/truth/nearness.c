@@ -88,9 +88,9 @@ static int by_key(const void *a, const void *b)
     return x->key < y->key ? -1 : x->key > y->key;
 }
 
-void search_choose_nearest(search *s)
+void search_choose_nearest(search *s, uint32_t most)
 {
-    uint32_t count = s->target_count, most = s->options->most_targets;
+    uint32_t count = s->target_count;
     if (count <= most) {
         return;
     }

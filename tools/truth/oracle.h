@@ -76,6 +76,11 @@ typedef bool oracle_visit(void *user, const oracle_chunk *chunk);
 bool oracle_boxes_walk(const truth *t, const double from[3], const double to[3],
                        oracle_visit *visit, void *user);
 
+typedef bool oracle_meets(const void *where, const umb_aabb *box);
+/* The same for every chunk whose box, and all boxes above it, meet what `where` says. */
+bool oracle_boxes_visit(const truth *t, oracle_meets *meets, const void *where, oracle_visit *visit,
+                        void *user);
+
 /* A view as half-spaces, and how far anything can be. */
 typedef struct oracle_view {
     const umb_view *view;

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "cover.h"
 #include "search.h"
 
 #define DEFAULT_BUDGET 4000000u
@@ -225,7 +226,7 @@ static void choose_targets(search *s)
         }
     }
     if (s->options->most_targets) {
-        search_choose_nearest(s);
+        search_choose_nearest(s, s->options->most_targets);
     }
 }
 
@@ -278,6 +279,7 @@ static void settle(search *s, int r, uint32_t object)
     }
     if (s->leaks[r][object].ray == NO_RAY) {
         s->leaks[r][object] = *f;
+        s->leaks[r][object].refuted = 0;
     }
     ++f->refuted;
     f->ray = NO_RAY;
@@ -300,6 +302,64 @@ static void verify(search *s)
     for (uint32_t k = 0; k < s->target_count; ++k) {
         settle(s, 0, s->targets[k]);
         settle(s, 1, s->targets[k]);
+    }
+}
+
+static bool is_accused(const search *s, uint32_t object)
+{
+    return s->in_view[object] && s->options->accused && s->options->accused[object] &&
+           search_known(s, object) == 0;
+}
+
+/* Items: target * 2 + renderer. */
+static void cover_item(worker *w, uint64_t item)
+{
+    search *s = w->s;
+    uint32_t object = s->targets[item / 2];
+    int r = (int)(item % 2);
+    find *f = &s->finds[r][object], *leak = &s->leaks[r][object];
+    cover_verdict verdict = oracle_cover(s->t, &s->view, object, (uint8_t)(1u << r),
+                                         &s->proven[r][object]);
+    s->verdicts[item] = (uint8_t)verdict;
+    if (verdict == COVER_HIDDEN) {
+        leak->refuted = leak->ray != NO_RAY;
+        leak->ray = NO_RAY;
+    } else if (verdict == COVER_SEEN) {
+        f->ray = s->phase << 52 | item;
+        f->verified = true;
+    }
+}
+
+static void add_accused(search *s, bool suspected)
+{
+    for (uint32_t i = 0; i < s->t->model->object_count; ++i) {
+        bool leaked = s->leaks[0][i].ray != NO_RAY || s->leaks[1][i].ray != NO_RAY;
+        if (is_accused(s, i) && leaked == suspected) {
+            s->targets[s->target_count++] = i;
+        }
+    }
+}
+
+/* Decide exactly what rays of floats only suspect and, where asked for, those of the other hidden
+ * objects that are nearest to being seen. */
+static void decide(search *s, truth_result *out)
+{
+    s->target_count = 0;
+    if (s->options->most_decided) {
+        add_accused(s, false);
+        search_choose_nearest(s, s->options->most_decided);
+    }
+    add_accused(s, true);
+    s->verdicts = calloc(2 * (size_t)s->target_count + 1, 1);
+    if (!s->verdicts) {
+        s->failed = true;
+        return;
+    }
+    search_phase(s, cover_item, 2 * (uint64_t)s->target_count, false);
+    for (uint32_t k = 0; k < s->target_count; ++k) {
+        cover_verdict a = s->verdicts[2 * k], b = s->verdicts[2 * k + 1];
+        out->decided_hidden += a == COVER_HIDDEN && b == COVER_HIDDEN;
+        out->undecided += a != COVER_SEEN && b != COVER_SEEN && (a == COVER_OPEN || b == COVER_OPEN);
     }
 }
 
@@ -379,6 +439,7 @@ static void search_free(search *s)
     free(s->border);
     free(s->grid);
     free(s->grid_depth);
+    free(s->verdicts);
 }
 
 /* Proven witnesses; for accused objects that have none for either renderer, the unproven ones. */
@@ -386,13 +447,12 @@ static void fill_witnesses(const search *s, truth_result *out)
 {
     truth_witness *lists[2] = {out->culling, out->two_sided};
     uint32_t *counts[2] = {&out->visible_culling, &out->visible_two_sided};
-    const uint8_t *accused = s->options->accused;
     for (uint32_t i = 0; i < s->t->model->object_count; ++i) {
         if (!s->in_view[i]) {
             continue;
         }
         ++out->in_view;
-        bool seen = search_known(s, i) != 0, leaked = false;
+        bool seen = search_known(s, i) != 0, leaked = false, refuted = false;
         out->visible += seen;
         for (int r = 0; r < 2; ++r) {
             const find *leak = &s->leaks[r][i];
@@ -400,14 +460,16 @@ static void fill_witnesses(const search *s, truth_result *out)
             if (s->finds[r][i].ray != NO_RAY) {
                 *w = s->proven[r][i];
                 ++*counts[r];
-            } else if (!seen && accused && accused[i] && leak->ray != NO_RAY) {
+            } else if (is_accused(s, i) && leak->ray != NO_RAY) {
                 memcpy(w->from, leak->from, sizeof(w->from));
                 memcpy(w->to, leak->to, sizeof(w->to));
                 w->renderers = (uint8_t)(1u << r);
                 leaked = true;
             }
+            refuted = refuted || leak->refuted != 0;
         }
         out->unconfirmed += leaked;
+        out->withdrawn += refuted && !leaked && !seen;
     }
 }
 
@@ -448,6 +510,7 @@ bool truth_view(truth *t, const umb_view *view, const truth_options *options, tr
         search_phase(&s, between_item, s.grid_height, true);
         verify(&s);
         rounds(&s);
+        decide(&s, out);
         ok = !s.failed && fill_result(&s, out);
     }
     search_free(&s);

@@ -64,6 +64,7 @@ typedef struct search {
     uint32_t grid_width, grid_height;
     truth_witness *proven[2]; /* per object: verified finds */
     find *leaks[2];           /* per object: the first refuted find, or NO_RAY */
+    uint8_t *verdicts;        /* cover_verdict, two per target of the last phase */
     worker *workers;
     uint32_t worker_count;
     uint64_t phase, round;
@@ -86,8 +87,8 @@ uint8_t search_aim(worker *w, const double through[3], uint32_t object, uint32_t
 /* Renderers for which the object had been seen when the running block began. */
 uint8_t search_known(const search *s, uint32_t object);
 
-/* Leave of the targets at most options->most_targets, those nearest to being seen (nearness.c). */
-void search_choose_nearest(search *s);
+/* Leave of the targets at most so many, those nearest to being seen (nearness.c). */
+void search_choose_nearest(search *s, uint32_t most);
 
 /* Rays just outside the silhouette edges of a newly seen triangle (borders.c). */
 void border_item(worker *w, uint64_t item);

@@ -37,6 +37,9 @@ typedef struct truth_options {
      * first those that the grid's depths leave room for in the picture, then those with room one
      * cell beside them, and an eighth anywhere. */
     uint32_t most_targets;
+    /* So many accused objects that no ray saw, nearest to being seen first, are decided exactly, as
+     * suspected ones always are: proven hidden, or seen after all. */
+    uint32_t most_decided;
     uint32_t threads; /* 0: 1 */
 } truth_options;
 
@@ -47,6 +50,8 @@ typedef struct truth_result {
     uint32_t in_view;     /* objects with triangles whose box no plane of the view keeps out */
     uint32_t visible;     /* objects with a confirmed witness for either renderer */
     uint32_t unconfirmed; /* accused objects with an unconfirmed one only */
+    uint32_t withdrawn;   /* accused objects that rays of floats saw and that are hidden, exactly */
+    uint32_t decided_hidden, undecided; /* of the accused objects that were to be decided exactly */
     uint32_t visible_culling, visible_two_sided;
     uint32_t rounds;   /* guided rounds until no new object appeared */
     bool budget_spent; /* stopped by the budget, not because nothing new appeared */
