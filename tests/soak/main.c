@@ -7,7 +7,8 @@
  * each part of the plan, and taken up by the next run of the same program over the same scenes.
  * --only: parts whose name or family contains TEXT. --views: of each part no more than N new ones.
  * --plant: cull a scene with a planted mistake (1: objects too small, 2: occluders too large),
- * which must be found. --part --view: one view alone, told in full.
+ * which must be found. --part --view: one view alone, told in full. FOLDER/wrongly-hidden.txt and
+ * unconfirmed.txt name objects with their lines.
  *
  * Exit codes: 0 nothing wrongly hidden; 1 something was; 2 wrong usage; 3 something cannot be read or
  * written; 4 interrupted or stopped by --views, what is done is saved. */
@@ -164,7 +165,6 @@ typedef struct soak_state {
     const settings *s;
     soak_scene scene;
     uint64_t program;
-    char wrong_file[1200];
     bool unfinished;
 } soak_state;
 
@@ -201,7 +201,7 @@ static bool run_part(soak_state *st, const soak_part *part, soak_count *count, u
         soak_run run = {.part = part,
                         .scene = &st->scene,
                         .log = &log,
-                        .wrong_file = st->wrong_file,
+                        .folder = st->s->out,
                         .threads = st->s->threads,
                         .most_batches = st->s->most_batches,
                         .stop = &stop};
@@ -228,7 +228,6 @@ static int run_plan(const settings *s, const soak_plan *plan, const char *progra
     soak_state st = {.s = s};
     soak_count *counts = calloc((size_t)plan->count + 1, sizeof *counts);
     bool ok = counts != NULL && program_hash(program, &st.program, &error);
-    (void)snprintf(st.wrong_file, sizeof st.wrong_file, "%.1000s/wrong.txt", s->out);
     for (uint32_t k = 0; ok && k < plan->count; ++k) {
         if (wanted(s, &plan->parts[k])) {
             ok = run_part(&st, &plan->parts[k], &counts[k], &error);

@@ -95,7 +95,7 @@ typedef struct soak_run {
     const soak_part *part;
     const soak_scene *scene;
     soak_log *log;
-    const char *wrong_file; /* each wrongly hidden object is told here, and on standard error */
+    const char *folder; /* wrongly-hidden.txt and unconfirmed.txt there name objects with their lines */
     uint32_t threads;
     uint32_t most_batches;             /* stop after so many new ones */
     bool quiet;                        /* no progress */

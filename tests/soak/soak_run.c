@@ -66,21 +66,23 @@ static bool fail(crew *c, const char *what, const umb_error *why)
     return false;
 }
 
-static void tell_wrong(bench *b, const model *m, const umb_view *view, uint64_t number,
-                       uint32_t object, const truth_witness *w)
+/* A line about a hidden object: to a file of its own, and to a stream if there is one. */
+static void tell(bench *b, const char *what, FILE *stream, const model *m, const umb_view *view,
+                 uint64_t number, uint32_t object, const truth_witness *w)
 {
     const soak_run *run = b->crew->run;
+    char name[1300];
+    (void)snprintf(name, sizeof name, "%.1000s/%s.txt", run->folder, what);
     pthread_mutex_lock(&b->crew->lock);
-    FILE *files[2] = {stderr, fopen(run->wrong_file, "a")};
+    FILE *files[2] = {stream, fopen(name, "a")};
     for (int k = 0; k < 2; ++k) {
         if (files[k] != NULL) {
             (void)fprintf(files[k],
-                          "wrongly hidden: part %s view %" PRIu64
-                          " raster %ux%u object %u (%s), seen from %.17g,%.17g,%.17g at "
-                          "%.17g,%.17g,%.17g\n",
-                          run->part->name, number, view->buffer_width, view->buffer_height, object,
-                          m->objects[object].name, w->from[0], w->from[1], w->from[2], w->to[0],
-                          w->to[1], w->to[2]);
+                          "%s: part %s view %" PRIu64 " raster %ux%u object %u (%s), from "
+                          "%.17g,%.17g,%.17g at %.17g,%.17g,%.17g\n",
+                          what, run->part->name, number, view->buffer_width, view->buffer_height,
+                          object, m->objects[object].name, w->from[0], w->from[1], w->from[2],
+                          w->to[0], w->to[1], w->to[2]);
         }
     }
     if (files[1] != NULL) {
@@ -103,11 +105,10 @@ static void judge(bench *b, const model *m, const umb_view *view, uint64_t numbe
             proof = both[k]->renderers != 0 && both[k]->confirmed != 0 ? both[k] : proof;
         }
         if (proof != NULL) {
-            tell_wrong(b, m, view, number, i, proof);
-        } else if (seen && b->print) {
-            const truth_witness *w = both[0]->renderers != 0 ? both[0] : both[1];
-            printf("unconfirmed: object %u, from %.17g,%.17g,%.17g at %.17g,%.17g,%.17g\n", i,
-                   w->from[0], w->from[1], w->from[2], w->to[0], w->to[1], w->to[2]);
+            tell(b, "wrongly-hidden", stderr, m, view, number, i, proof);
+        } else if (seen) {
+            tell(b, "unconfirmed", b->print ? stdout : NULL, m, view, number, i,
+                 both[0]->renderers != 0 ? both[0] : both[1]);
         }
         sum->wrong += proof != NULL;
         sum->unconfirmed += seen && proof == NULL;

@@ -25,8 +25,9 @@
 #define MOST_SIDES 40u
 #define MOST_PIECES 256u
 #define MOST_BLOCKERS 8192u
-#define MOST_CUTS 60000u /* blockers against pieces, for an object */
-#define MOST_TRIED 24u   /* middles of pieces, for an object */
+#define MOST_CUTS 60000u  /* blockers against pieces, for an object */
+#define STRIP_WIDTH 1e-11 /* half of it, of the slopes' size */
+#define MOST_TRIED 24u    /* middles of pieces, for an object */
 
 typedef struct piece {
     uint32_t count;
@@ -409,6 +410,115 @@ static cover_verdict left_over(cover *c, truth_witness *out)
     return COVER_OPEN;
 }
 
+/* What is seen edge-on or has no area has a stretch of a line for its image. It is hidden if a thin
+ * strip around that is covered, nearer than the triangle's nearest corner. */
+static bool make_strip(cover *c, float v[3][3], const exact corner[3][3], exact out[4][3])
+{
+    const umb_view *view = c->space.v->view;
+    double at[3][2], longest = -1.0, along[2] = {1.0, 0.0};
+    int from = 0, to = 0;
+    for (int k = 0; k < 3; ++k) {
+        double p[3] = {v[k][0], v[k][1], v[k][2]}, depth = slopes(c, p, at[k]);
+        for (int i = 0; i < 2; ++i) {
+            at[k][i] = c->space.parallel ? exact_estimate(&corner[k][i]) : at[k][i] / depth;
+        }
+    }
+    for (int k = 0; k < 3; ++k) {
+        double x = at[(k + 1) % 3][0] - at[k][0], y = at[(k + 1) % 3][1] - at[k][1];
+        double length = sqrt(x * x + y * y);
+        if (length > longest) {
+            longest = length;
+            from = k;
+            to = (k + 1) % 3;
+            along[0] = length > 0.0 ? x / length : 1.0;
+            along[1] = length > 0.0 ? y / length : 0.0;
+        }
+    }
+    double size = fabs(at[from][0]) + fabs(at[from][1]) + longest + (c->space.parallel ? 0.0 : 1.0);
+    double wide = STRIP_WIDTH * size;
+    static const double turns[4][2] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
+    for (int k = 0; k < 4; ++k) {
+        const double *end = at[turns[k][0] < 0 ? from : to];
+        double x = end[0] + wide * (turns[k][0] * along[0] - turns[k][1] * along[1]);
+        double y = end[1] + wide * (turns[k][0] * along[1] + turns[k][1] * along[0]);
+        double d[3] = {nearbyint(x), nearbyint(y), 1.0}, largest = 0.0;
+        for (int i = 0; i < 3 && !c->space.parallel; ++i) {
+            d[i] = view->forward[i] + x * view->right[i] + y * view->up[i];
+            largest = fmax(largest, fabs(d[i]));
+        }
+        for (int i = 0; i < 3; ++i) {
+            /* Few enough bits for exact products. */
+            exact_set(&out[k][i],
+                      c->space.parallel ? d[i] : ldexp(nearbyint(ldexp(d[i] / largest, 60)), -20));
+        }
+    }
+    return isfinite(size);
+}
+
+static cover_verdict cover_edge_on(cover *c, float v[3][3], double p[3][3])
+{
+    const umb_view *view = c->space.v->view;
+    exact corner[3][3], strip[4][3], depth;
+    shade target = {.facing = 0};
+    piece first = {.count = 4};
+    double nearest = INFINITY;
+    for (int k = 0; k < 3; ++k) {
+        shade_sight(&c->space, p[k], corner[k]);
+        shade_value(&c->space, view->forward, p[k], view->near_depth, &depth);
+        if (exact_sign(&depth, &c->space.lost) < 0) {
+            return COVER_OPEN;
+        }
+        double about = exact_estimate(&depth);
+        if (about < nearest) {
+            nearest = about;
+            shade_value(&c->space, view->forward, p[k], c->space.parallel ? view->near_depth : 0.0,
+                        &target.det);
+        }
+    }
+    /* The plane at a depth that is less than any corner's by more than the estimates' rounding. */
+    double less = exact_estimate(&target.det);
+    exact_set(&target.det, less - ldexp(fabs(less), -48));
+    for (int i = 0; i < 3; ++i) {
+        exact_set(&target.nearness.n[i],
+                  c->space.parallel ? 0.0 : view->forward[i] * SHADE_AXIS_SCALE);
+    }
+    if (c->space.parallel) {
+        target.nearness.n[2] = target.det;
+        shade_negate(&target.nearness.n[2]);
+        exact_set(&target.det, 1.0);
+    }
+    shade_about(&target.nearness);
+    target.det_about = exact_estimate(&target.det);
+    if (!(target.det_about > 0.0) || !make_strip(c, v, (const exact(*)[3])corner, strip)) {
+        return COVER_OPEN;
+    }
+    /* Which way round the strip's corners run depends on the view's handedness. */
+    covector side[4];
+    exact across;
+    shade_cross(side[0].n, strip[0], strip[1]);
+    shade_dot(&across, strip[2], side[0].n);
+    bool turned = exact_sign(&across, &c->space.lost) < 0;
+    c->line_count = 0;
+    c->piece_count = 0;
+    for (uint32_t k = 0; k < 4; ++k) {
+        uint32_t a = turned ? 3 - k : k, b = turned ? (6 - k) % 4 : (k + 1) % 4;
+        shade_cross(side[k].n, strip[a], strip[b]);
+        shade_about(&side[k]);
+        first.line[k] = add_line(c, &side[k]);
+        for (int j = 0; j < 3; ++j) {
+            exact inside;
+            shade_dot(&inside, side[k].n, corner[j]);
+            if (exact_sign(&inside, &c->space.lost) <= 0) {
+                return COVER_OPEN;
+            }
+        }
+    }
+    add_piece(c, &first);
+    gather(c, v);
+    cover_by_all(c, &target);
+    return c->piece_count == 0 && !c->space.lost ? COVER_HIDDEN : COVER_OPEN;
+}
+
 static cover_verdict cover_triangle(cover *c, uint32_t triangle, truth_witness *out)
 {
     float v[3][3];
@@ -431,7 +541,7 @@ static cover_verdict cover_triangle(cover *c, uint32_t triangle, truth_witness *
     }
     uint8_t flags = oracle_flags(c->t, c->object, triangle);
     if (!shade_make(&c->space, p, &target, &turned)) {
-        return COVER_OPEN; /* edge-on: its image has no inside */
+        return cover_edge_on(c, v, p);
     }
     if (c->renderer == TRUTH_CULLING && !oracle_shown(flags, target.facing)) {
         return COVER_HIDDEN;

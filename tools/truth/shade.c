@@ -20,7 +20,7 @@ static int lowest_bit(double x)
     return exponent - 53 + zeros;
 }
 
-static void about(covector *c)
+void shade_about(covector *c)
 {
     for (int i = 0; i < 3; ++i) {
         c->about[i] = exact_estimate(&c->n[i]);
@@ -38,7 +38,7 @@ void shade_cross(exact out[3], const exact a[3], const exact b[3])
     }
 }
 
-static void dot(exact *out, const exact a[3], const exact b[3])
+void shade_dot(exact *out, const exact a[3], const exact b[3])
 {
     exact p, q, sum;
     exact_multiply(&p, &a[0], &b[0]);
@@ -55,9 +55,8 @@ void shade_negate(exact *x)
     }
 }
 
-/* axis . (p - eye) - limit, all multiplied by 2^60 and 2^up; p and eye are multiplied already. */
-static void value_at(const sight_space *c, const double axis[3], const double p[3], double limit,
-                     exact *out)
+void shade_value(const sight_space *c, const double axis[3], const double p[3], double limit,
+                 exact *out)
 {
     exact_set(out, -ldexp(limit, c->up) * SHADE_AXIS_SCALE);
     for (int i = 0; i < 3; ++i) {
@@ -70,8 +69,7 @@ static void value_at(const sight_space *c, const double axis[3], const double p[
     }
 }
 
-/* A point as a line of sight. */
-static void sight_of(const sight_space *c, const double p[3], exact out[3])
+void shade_sight(const sight_space *c, const double p[3], exact out[3])
 {
     if (!c->parallel) {
         for (int i = 0; i < 3; ++i) {
@@ -147,7 +145,7 @@ int shade_sign(sight_space *c, const covector *f, const covector *l, const covec
     }
     exact corner[3], sum;
     shade_cross(corner, l->n, m->n);
-    dot(&sum, f->n, corner);
+    shade_dot(&sum, f->n, corner);
     return exact_sign(&sum, &c->lost);
 }
 
@@ -167,8 +165,8 @@ bool shade_nearer(sight_space *c, const shade *a, const shade *b, const covector
     }
     exact corner[3], na, nb, x, y, difference;
     shade_cross(corner, l->n, m->n);
-    dot(&na, a->nearness.n, corner);
-    dot(&nb, b->nearness.n, corner);
+    shade_dot(&na, a->nearness.n, corner);
+    shade_dot(&nb, b->nearness.n, corner);
     exact_multiply(&x, &na, &b->det);
     exact_multiply(&y, &nb, &a->det);
     exact_subtract(&difference, &x, &y);
@@ -187,7 +185,7 @@ void shade_spread(const shade *s, const exact value[3], covector *out)
         exact_multiply(&p, &value[2], &s->side[2].n[i]);
         exact_add(&out->n[i], &sum, &p);
     }
-    about(out);
+    shade_about(out);
 }
 
 void shade_scale(const sight_space *c, float v[3][3], double p[3][3])
@@ -207,14 +205,14 @@ bool shade_make(sight_space *c, double p[3][3], shade *out, bool *turned)
         if (!shade_holds(c, p[k])) {
             return false;
         }
-        sight_of(c, p[k], corner[k]);
-        value_at(c, c->v->view->forward, p[k], c->v->view->near_depth, &depth[k]);
+        shade_sight(c, p[k], corner[k]);
+        shade_value(c, c->v->view->forward, p[k], c->v->view->near_depth, &depth[k]);
         nearer += exact_sign(&depth[k], &c->lost) < 0;
     }
     for (int k = 0; k < 3; ++k) {
         shade_cross(out->side[k].n, corner[(k + 1) % 3], corner[(k + 2) % 3]);
     }
-    dot(&out->det, corner[0], out->side[0].n);
+    shade_dot(&out->det, corner[0], out->side[0].n);
     int sign = exact_sign(&out->det, &c->lost);
     *turned = sign < 0;
     out->facing = c->parallel && c->v->view->forward[c->drop] < 0.0 ? -sign : sign;
@@ -222,7 +220,7 @@ bool shade_make(sight_space *c, double p[3][3], shade *out, bool *turned)
         for (int i = 0; i < 3 && sign < 0; ++i) {
             shade_negate(&out->side[k].n[i]);
         }
-        about(&out->side[k]);
+        shade_about(&out->side[k]);
     }
     if (sign < 0) {
         shade_negate(&out->det);
@@ -256,17 +254,17 @@ uint32_t shade_view_values(const sight_space *c, double p[3][3], exact (*values)
     for (int k = 0; k < 3; ++k) {
         uint32_t at = 0;
         exact depth, far_depth;
-        value_at(c, view->forward, p[k], view->near_depth, &values[at++][k]);
+        shade_value(c, view->forward, p[k], view->near_depth, &values[at++][k]);
         if (!isinf(view->far_depth)) {
-            value_at(c, view->forward, p[k], view->far_depth, &far_depth);
+            shade_value(c, view->forward, p[k], view->far_depth, &far_depth);
             shade_negate(&far_depth);
             values[at++][k] = far_depth;
         }
-        value_at(c, view->forward, p[k], 0.0, &depth);
+        shade_value(c, view->forward, p[k], 0.0, &depth);
         for (int i = 0; i < 4; ++i) {
             exact across, limit, product;
             double end = ends[i / 2][i % 2];
-            value_at(c, axes[i / 2], p[k], c->parallel ? end : 0.0, &across);
+            shade_value(c, axes[i / 2], p[k], c->parallel ? end : 0.0, &across);
             exact_set(&limit, c->parallel ? 0.0 : end);
             exact_multiply(&product, &depth, &limit);
             exact_subtract(&values[at][k], &across, &product);

@@ -54,6 +54,11 @@ typedef struct shade {
 void shade_scale(const sight_space *c, float v[3][3], double p[3][3]);
 /* May a multiplied point be used? */
 bool shade_holds(const sight_space *c, const double p[3]);
+/* A multiplied point as a sight. */
+void shade_sight(const sight_space *c, const double p[3], exact out[3]);
+/* axis . (p - eye) - limit, multiplied by 2^60 and 2^up; p is multiplied already, limit is not. */
+void shade_value(const sight_space *c, const double axis[3], const double p[3], double limit,
+                 exact *out);
 /* False when it is seen edge-on, has no area, lies before the near plane, or does not fit. turned:
  * the sides run the other way round. */
 bool shade_make(sight_space *c, double p[3][3], shade *out, bool *turned);
@@ -69,6 +74,8 @@ int shade_sign(sight_space *c, const covector *f, const covector *l, const covec
 bool shade_nearer(sight_space *c, const shade *a, const shade *b, const covector *l,
                   const covector *m);
 
+void shade_about(covector *c); /* fill in about from n */
+void shade_dot(exact *out, const exact a[3], const exact b[3]);
 void shade_cross(exact out[3], const exact a[3], const exact b[3]);
 void shade_negate(exact *x);
 
