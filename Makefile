@@ -40,9 +40,9 @@ matrix: build ## Clang, ThreadSanitizer, scalar-only, -O0, -O3: tests, and equal
 	@scripts/deps build matrix
 	@scripts/matrix
 
-bench: deps ## measure whole frames beside rivals and exact answers (BENCH=--quick: two minutes)
+bench: deps ## measure whole frames beside rivals and exact answers (BENCH=--quick: the short one)
 	@cmake --preset bench >/dev/null
-	@$(BUILD) build/bench -j $(JOBS)
+	@$(BUILD) build/bench -j $(JOBS) --target compare --target bench_boxes
 	@scripts/bench $(BENCH)
 
 results: deps ## docs/results/compare.md and its plots, by a full bench

@@ -79,7 +79,7 @@ static bool soup_fill(soup *s, const model *m)
 
 static bool soup_build(soup *s)
 {
-    s->device = rtcNewDevice("threads=0");
+    s->device = rtcNewDevice("threads=1");
     for (int k = 0; k < KINDS && s->device != NULL; ++k) {
         if (s->count[k] == 0) {
             continue;
@@ -350,8 +350,7 @@ uint32_t item_buffer_confirm(const world *w, const umb_view *view, const uint8_t
     truth_result result;
     truth *t = truth_create(w->model, &error);
     uint32_t confirmed = UINT32_MAX;
-    truth_options options = {
-        .grid_width = 640, .grid_height = 360, .accused = hidden, .threads = 1};
+    truth_options options = {.grid_width = 640, .grid_height = 360, .accused = hidden, .threads = 1};
     if (t != NULL && truth_view(t, view, &options, &result, &error)) {
         confirmed = 0;
         for (uint32_t i = 0; i < w->model->object_count; ++i) {

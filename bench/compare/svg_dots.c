@@ -3,10 +3,11 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "io/output.h"
 
-enum { LEFT = 190, PLOT = 620, RIGHT = 30, TOP = 84, LINE = 22, BOTTOM = 50 };
+enum { LEFT = 190, PLOT = 620, RIGHT = 30, TOP = 104, LINE = 22, BOTTOM = 50 };
 
 typedef struct scale {
     double low, high; /* decimal logarithms of the ends */
@@ -96,19 +97,22 @@ bool svg_dots_write(const svg_dots *plot, const char *file, umb_error *error)
                   width, bottom + BOTTOM, width, bottom + BOTTOM);
     text(f, 16, 24, "start", "font-size=\"15\" fill=\"#111\"", plot->title);
     double x = 22;
+    double y = 48;
     for (uint32_t i = 0; i < plot->series_count; ++i) {
-        mark(f, x, 48, plot->series[i].colour, plot->series[i].ring);
-        text(f, x + 12, 52, "start", "fill=\"#333\"", plot->series[i].name);
-        x += 34 + 6.6 * (double)snprintf(NULL, 0, "%s", plot->series[i].name);
+        double wide = 34 + 6.6 * (double)strlen(plot->series[i].name);
+        if (x + wide > width) {
+            x = 22;
+            y += 22;
+        }
+        mark(f, x, y, plot->series[i].colour, plot->series[i].ring);
+        text(f, x + 12, y + 4, "start", "fill=\"#333\"", plot->series[i].name);
+        x += wide;
     }
     axis(f, plot, &s, bottom);
     for (uint32_t i = 0; i < plot->line_count; ++i) {
-        double y = TOP + LINE * (i + 0.5);
-        if (plot->lines[i] != NULL) {
-            text(f, LEFT - 10, y + 4, "end", "fill=\"#333\"", plot->lines[i]);
-            (void)fprintf(f, "<path d=\"M%d %.1f H%d\" stroke=\"#f0f0f0\"/>\n", LEFT, y,
-                          LEFT + PLOT);
-        }
+        double at = TOP + LINE * (i + 0.5);
+        text(f, LEFT - 10, at + 4, "end", "fill=\"#333\"", plot->lines[i]);
+        (void)fprintf(f, "<path d=\"M%d %.1f H%d\" stroke=\"#f0f0f0\"/>\n", LEFT, at, LEFT + PLOT);
     }
     for (uint32_t i = 0; i < plot->dot_count; ++i) {
         const svg_dots_dot *d = &plot->dots[i];

@@ -20,7 +20,7 @@ typedef struct svg_dots_dot {
 
 typedef struct svg_dots {
     const char *title, *axis;
-    const char *const *lines; /* labels, top to bottom; one that is NULL leaves a gap */
+    const char *const *lines; /* labels, top to bottom */
     uint32_t line_count;
     const svg_dots_series *series;
     uint32_t series_count;

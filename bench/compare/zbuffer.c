@@ -152,21 +152,27 @@ static bool set_up(const float p[3][3], edge e[3], uint32_t *edges, gradient *g)
     return true;
 }
 
-static float tile_bound(zbuffer *z, uint32_t tx, uint32_t ty)
+static void bound_tile(zbuffer *z, uint32_t tx, uint32_t ty)
+{
+    size_t t = (size_t)ty * z->tiles_x + tx;
+    const float *row = z->depth + (size_t)ty * TILE * z->stride + (size_t)tx * TILE;
+    lanes least = lanes_load(row);
+    for (uint32_t y = 1; y < TILE; ++y) {
+        least = lanes_least(least, lanes_load(row + y * z->stride));
+    }
+    float bound = least[0];
+    for (uint32_t j = 1; j < TILE; ++j) {
+        bound = least[j] < bound ? least[j] : bound;
+    }
+    z->tile[t] = bound;
+    z->changed[t] = 0;
+}
+
+static inline float tile_bound(zbuffer *z, uint32_t tx, uint32_t ty)
 {
     size_t t = (size_t)ty * z->tiles_x + tx;
     if (z->changed[t]) {
-        const float *row = z->depth + (size_t)ty * TILE * z->stride + (size_t)tx * TILE;
-        lanes least = lanes_load(row);
-        for (uint32_t y = 1; y < TILE; ++y) {
-            least = lanes_least(least, lanes_load(row + y * z->stride));
-        }
-        float bound = least[0];
-        for (uint32_t j = 1; j < TILE; ++j) {
-            bound = least[j] < bound ? least[j] : bound;
-        }
-        z->tile[t] = bound;
-        z->changed[t] = 0;
+        bound_tile(z, tx, ty);
     }
     return z->tile[t];
 }
