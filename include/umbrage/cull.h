@@ -66,11 +66,12 @@ UMB_API void umb_culler_destroy(umb_culler *culler);
  * (umb_view_check), no memory. *out is then empty. */
 UMB_API umb_result umb_cull(umb_culler *culler, const umb_view *view, umb_visible_set *out);
 
-/* The occlusion buffer after the last umb_cull: for each pixel, row by row from the top, 1 / depth
- * of a bound that what covers it lies in front of; 0 where not covered. For orthographic views the
- * value is 1 / (1 + depth - near depth). The raster is the method's own: upright and dense at the horizon
- * where the view names a vertical. Returns false, with the sizes only, when pixels is NULL or
- * capacity (in floats) is too small, or when the method has no buffer (sizes 0). */
+/* The occlusion buffer after the last umb_cull, as the view sees it: the picture in as many columns and rows as
+ * the method's raster has, row by row from the top; at each middle, 1 / depth of a bound that what covers it lies
+ * in front of; 0 where not covered. For orthographic views the value is 1 / (1 + depth - near depth). The raster
+ * itself stands upright and is dense at the horizon where the view names a vertical, so this is a sampled copy, to
+ * look at. Returns false, with the sizes only, when pixels is NULL or capacity (in floats) is too small, or when the
+ * method has no buffer (sizes 0). */
 UMB_API bool umb_culler_read_buffer(const umb_culler *culler, float *pixels, size_t capacity,
                                     uint32_t *width, uint32_t *height);
 

@@ -28,6 +28,7 @@
 typedef float umb_fv __attribute__((vector_size(4 * UMB_LANES)));
 typedef int32_t umb_iv __attribute__((vector_size(4 * UMB_LANES)));
 typedef double umb_dv __attribute__((vector_size(4 * UMB_LANES)));
+typedef int64_t umb_lv __attribute__((vector_size(4 * UMB_LANES))); /* what comparing doubles gives */
 
 #define UMB_INLINE static inline __attribute__((always_inline, unused))
 
@@ -86,6 +87,21 @@ UMB_INLINE void umb_dv_store(double *p, umb_dv v)
 UMB_INLINE umb_iv umb_iv_select(umb_iv mask, umb_iv a, umb_iv b)
 {
     return (a & mask) | (b & ~mask);
+}
+
+UMB_INLINE umb_dv umb_dv_select(umb_lv mask, umb_dv a, umb_dv b)
+{
+    return (umb_dv)(((umb_lv)a & mask) | ((umb_lv)b & ~mask));
+}
+
+/* Masks of doubles as one of whole numbers. */
+UMB_INLINE umb_iv umb_lv_narrow(umb_lv low, umb_lv high)
+{
+#if UMB_LANES == 8
+    return __builtin_shufflevector((umb_iv)low, (umb_iv)high, 0, 2, 4, 6, 8, 10, 12, 14);
+#else
+    return __builtin_shufflevector((umb_iv)low, (umb_iv)high, 0, 2, 4, 6);
+#endif
 }
 
 /* ---- minima, maxima, choices, conversions towards zero (values must fit), narrowing ------------- */
@@ -304,6 +320,14 @@ UMB_INLINE umb_iv umb_iv_or_fours(umb_iv v)
     v |= __builtin_shufflevector(v, v, 2, 3, 0, 1);
     return v | __builtin_shufflevector(v, v, 1, 0, 3, 2);
 #endif
+}
+
+/* From lanes that are sub-tiles (all ones or zeros) to lanes that are rows: byte b of every lane is that of the
+ * sub-tile b of its four. */
+UMB_INLINE umb_iv umb_iv_spread(umb_iv v)
+{
+    static const uint32_t byte[8] = {0xFF, 0xFF00, 0xFF0000, 0xFF000000, 0xFF, 0xFF00, 0xFF0000, 0xFF000000};
+    return umb_iv_or_fours(v & umb_iv_load(byte));
 }
 
 /* Part i of eight lanes of which the first four are a and the last four b. */

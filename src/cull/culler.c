@@ -270,11 +270,15 @@ static bool object_shows(walk *w, const umb_object *o, umb_waiting *item)
     case UMB_DETAIL_NONE:
         return true;
     case UMB_DETAIL_BODY:
-        w->stats.queries += item->testable;
-        return !(item->testable && c->ops->hides_body(c->method, o->occluder, &item->image));
-    default:
-        return umb_detail_shows(&asker, o, &item->part, &item->settled);
+        if (item->testable) {
+            w->stats.queries += 1;
+            return !c->ops->hides_body(c->method, o->occluder, &item->image);
+        }
+        break;
+    case UMB_DETAIL_PARTS:
+        break;
     }
+    return umb_detail_shows(&asker, o, &item->part, &item->settled);
 }
 
 /* An object whose turn has come. It is reported only when everything that can hide it has been
@@ -411,6 +415,26 @@ umb_result umb_cull(umb_culler *c, const umb_view *view, umb_visible_set *out)
     return UMB_OK;
 }
 
+/* The buffer as the view sees it at a point of its picture: d.right and d.up where d.forward is 1. Both the raster
+ * and the view look from the eye, so only the depth must be turned from W into one along forward. */
+static float sample_buffer(const umb_coverage *b, const umb_raster_map *map, const umb_view *v, double x, double y)
+{
+    umb_vec3 right = umb_vec3_scale(umb_vec3_from_double(v->right), x);
+    umb_vec3 up = umb_vec3_scale(umb_vec3_from_double(v->up), y);
+    umb_vec3 d = umb_vec3_add(umb_vec3_add(right, up), umb_vec3_from_double(v->forward));
+    double w = umb_vec3_dot(map->w, d), scale = map->orthographic ? 1.0 : 1.0 / w;
+    double px = umb_vec3_dot(map->x, d) * scale + map->cx;
+    uint32_t column = px < 0.0 ? 0 : px >= b->width ? b->width - 1 : (uint32_t)px;
+    uint32_t row = (uint32_t)umb_raster_map_row_at(map, umb_vec3_dot(map->y, d) * scale + map->cy, 0.0);
+    const umb_tile *t = &b->tiles[(size_t)(row / UMB_TILE_HEIGHT) * b->columns + column / UMB_TILE_WIDTH];
+    uint32_t r = row % UMB_TILE_HEIGHT, bit = column % UMB_TILE_WIDTH;
+    if ((t->mask[r] >> bit & 1u) == 0) {
+        return 0.0f;
+    }
+    float z = t->z[4 * (r / 4) + bit / 8];
+    return (float)(map->orthographic ? 1.0 / (1.0 - z - v->near_depth) : z * w);
+}
+
 bool umb_culler_read_buffer(const umb_culler *c, float *pixels, size_t capacity, uint32_t *width,
                             uint32_t *height)
 {
@@ -424,18 +448,14 @@ bool umb_culler_read_buffer(const umb_culler *c, float *pixels, size_t capacity,
     if (pixels == NULL || capacity < (size_t)b->width * b->height) {
         return false;
     }
-    bool parallel = c->view.projection == UMB_ORTHOGRAPHIC;
-    for (uint32_t y = 0; y < b->height; ++y) {
-        for (uint32_t x = 0; x < b->width; ++x) {
-            const umb_tile
-                *t = &b->tiles[(size_t)(y / UMB_TILE_HEIGHT) * b->columns + x / UMB_TILE_WIDTH];
-            uint32_t r = y % UMB_TILE_HEIGHT, column = x % UMB_TILE_WIDTH;
-            bool covered = (t->mask[r] >> column & 1u) != 0;
-            float z = t->z[4 * (r / 4) + column / 8];
-            pixels[(size_t)y * b->width + x] = !covered ? 0.0f
-                                               : parallel
-                                                   ? (float)(1.0 / (1.0 - z - c->view.near_depth))
-                                                   : z;
+    const umb_view *v = &c->view;
+    umb_raster_map map;
+    umb_raster_map_prepare(&map, v, c->rows);
+    for (uint32_t j = 0; j < b->height; ++j) {
+        double y = v->y_max - (v->y_max - v->y_min) * (j + 0.5) / b->height;
+        for (uint32_t i = 0; i < b->width; ++i) {
+            double x = v->x_min + (v->x_max - v->x_min) * (i + 0.5) / b->width;
+            pixels[(size_t)j * b->width + i] = sample_buffer(b, &map, v, x, y);
         }
     }
     return true;

@@ -29,38 +29,34 @@ bool umb_convex_place(umb_convex *c, const umb_raster_map *map, const umb_convex
     return true;
 }
 
-umb_convex_result umb_convex_of_silhouette(const umb_silhouette *s, const umb_raster_map *map, umb_convex *out)
+umb_convex_result umb_convex_of_silhouette(const umb_silhouette *s, const umb_raster_map *map,
+                                           const umb_occluder *o, umb_convex *out)
 {
-    if (s->triangle_count > UMB_CONVEX_TRIANGLES || s->edge_count > UMB_CONVEX_EDGES) {
+    if (s->front_count > UMB_CONVEX_TRIANGLES || s->edge_count > UMB_CONVEX_EDGES) {
         return UMB_CONVEX_OTHER;
     }
-    umb_convex_frame f = {.error = 0.0,
+    umb_convex_frame f = {.error = s->error,
                           .extent = s->x_max - s->x_min,
                           .height = map->height,
                           .y_min = s->y_min,
                           .y_max = s->y_max};
-    for (uint32_t i = 0; i < s->edge_count; ++i) {
-        f.error = s->edges[i].error > f.error ? s->edges[i].error : f.error;
-    }
     out->left.count = out->right.count = out->edge_count = out->plane_count = 0;
     for (uint32_t i = 0; i < s->edge_count; ++i) {
         const umb_outline_edge *e = &s->edges[i];
-        bool along = e->multiplicity > 0;
-        if (!umb_convex_add_line(out, &f, along ? e->x0 : e->x1, along ? e->y0 : e->y1, along ? e->x1 : e->x0,
-                                 along ? e->y1 : e->y0)) {
+        bool down = e->count > 0;
+        if (!umb_convex_add_line(out, &f, down ? e->x_top : e->x_low, down ? e->y_min : e->y_max,
+                                 down ? e->x_low : e->x_top, down ? e->y_max : e->y_min)) {
             return UMB_CONVEX_OTHER;
         }
     }
     if (!umb_convex_place(out, map, &f, s->x_min, s->x_max)) {
         return UMB_CONVEX_NOTHING;
     }
-    for (uint32_t i = 0; i < s->triangle_count; ++i) {
-        umb_depth_triangle t;
-        umb_silhouette_depth(s, map, &s->triangles[i], &t);
-        /* The plane's own relative 2^-22 is less than this part of its largest value over the raster. */
-        double size = fabs(t.gx) * map->width + fabs(t.gy) * map->height + fabs(t.g0);
-        umb_convex_add_plane(out, map, t.gx, t.gy, t.g0 - 0x1p-22 * size, t.g0, t.least);
+    for (uint32_t i = 0; i < s->front_count; ++i) {
+        umb_silhouette_plane p;
+        umb_silhouette_plane_of(s, map, o, s->front[i], &p);
+        umb_convex_add_plane(out, map, p.gx, p.gy, p.low, p.low, p.far_corner);
     }
-    out->most = (float)(s->most + 0x1p-20 * fabs(s->most));
+    out->most = (float)(s->most + 0x1p-22 * fabs(s->most));
     return UMB_CONVEX_READY;
 }

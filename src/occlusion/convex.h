@@ -17,7 +17,6 @@
 
 enum {
     UMB_CONVEX_TRIANGLES = 32, /* a convex shape of more is drawn as any other */
-    UMB_CONVEX_VERTICES = 24,  /* at least UMB_CONVEX_TRIANGLES / 2 + 2, a multiple of eight */
     UMB_CONVEX_EDGES = 64
 };
 
@@ -111,8 +110,9 @@ static inline void umb_convex_add_plane(umb_convex *c, const umb_raster_map *map
     c->high[i] = fits ? (float)(high + 0x1p-21 * size) : INFINITY;
 }
 
-/* The covered part of a convex occluder that the near cut may go through, from its general silhouette. Of the
+/* The covered part of a convex occluder that the near cut goes through, from its general silhouette. Of the
  * result only what umb_raster_kernels.fill_convex needs is there. */
-umb_convex_result umb_convex_of_silhouette(const umb_silhouette *s, const umb_raster_map *map, umb_convex *out);
+umb_convex_result umb_convex_of_silhouette(const umb_silhouette *s, const umb_raster_map *map,
+                                           const umb_occluder *o, umb_convex *out);
 
 #endif

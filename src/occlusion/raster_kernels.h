@@ -9,6 +9,18 @@
 #include "raster_map.h"
 #include "scene/scene.h"
 
+/* What filling a mesh works on: the tiles of its window, and for each row of tiles the lists of edges and of
+ * triangles that begin there. by_plane: one triangle's plane and farthest corner hold for all of them. */
+typedef struct umb_mesh_fill {
+    struct umb_row_tile *tiles; /* UMB_ROW_TILE_BYTES for each column of tiles of the raster */
+    uint8_t *edged;             /* all 0 */
+    uint32_t *edges, *triangles; /* per row of tiles: the first of a list, or UMB_NONE */
+    uint32_t tx0, tx1, ty0, ty1;
+    bool by_plane;
+} umb_mesh_fill;
+
+#define UMB_ROW_TILE_BYTES 256
+
 typedef struct umb_raster_kernels {
     umb_isa isa;
     /* For the boxes of a mask, which must be testable and not beside the raster: a bit for each whose
@@ -16,17 +28,19 @@ typedef struct umb_raster_kernels {
     uint32_t (*hides)(const umb_coverage *c, const umb_projected *boxes, uint32_t mask);
     /* The same for one rectangle. */
     bool (*hides_rect)(const umb_coverage *c, umb_pixel_rect rect, float nearness);
-    /* Add one occluder's pixels of one tile: mask as in the tile, z a lower bound of its nearness for each
-       sub-tile with a bit. Keeps the invariant whatever the order of calls. True if the tile changed. */
-    bool (*merge)(umb_coverage *c, uint32_t tile, const uint32_t mask[UMB_TILE_HEIGHT], const float z[8]);
-    /* mesh->convex, and at most UMB_CONVEX_TRIANGLES. */
+    /* Place an occluder's vertices: all of the silhouette's vertex arrays, and its numbers up to most. */
+    void (*place)(umb_silhouette *s, const umb_raster_map *map, const umb_occluder *occluder);
+    /* mesh->convex, at most UMB_CONVEX_TRIANGLES, placed, and no vertex is cut away. */
     umb_convex_result (*find_convex)(const umb_raster_map *map, const umb_occluder *occluder,
-                                     umb_convex *out);
+                                     const umb_silhouette *s, umb_convex *out);
     /* Add what a convex occluder covers. True if the buffer changed. */
     bool (*fill_convex)(umb_coverage *c, const umb_raster_map *map, const umb_convex *convex);
     /* True if all of the body is hidden, as far as it lies in rect; find_convex made it. */
     bool (*hides_convex)(const umb_coverage *c, const umb_raster_map *map, const umb_convex *convex,
                          umb_pixel_rect rect);
+    /* Add what any occluder covers: its outline and, unless fill->by_plane, its depth triangles are found. True if
+       the buffer changed. */
+    bool (*fill_mesh)(umb_coverage *c, const umb_raster_map *map, umb_silhouette *s, umb_mesh_fill *fill);
 } umb_raster_kernels;
 
 /* The kernels of an instruction set, AUTO for the best; NULL when it is not available. */

@@ -119,31 +119,10 @@ static inline bool merge_parts(umb_coverage *c, size_t number, const tile_part p
     return umb_iv_any(any);
 }
 
-static bool merge(umb_coverage *c, uint32_t tile, const uint32_t mask[UMB_TILE_HEIGHT], const float z[8])
-{
-    tile_part parts[UMB_PARTS];
-    for (int i = 0; i < UMB_PARTS; ++i) {
-        parts[i].mask = umb_iv_load(mask + i * UMB_LANES);
-        parts[i].z = umb_fv_load(z + i * UMB_LANES);
-    }
-    return merge_parts(c, tile, parts);
-}
+/* ---- vertices ------------------------------------------------------------------------------- */
 
-/* ---- convex shapes: set-up ------------------------------------------------------------------ */
-
-/* Vertices of the shape on the raster. */
-typedef struct corners {
-    double x[UMB_CONVEX_VERTICES], y[UMB_CONVEX_VERTICES];
-    /* Nearness, rounded away from the eye by more than its error, and towards it. */
-    double near_least[UMB_CONVEX_VERTICES], near_most[UMB_CONVEX_VERTICES];
-    double error;                           /* of each x and y */
-    double x_min, y_min, x_max, y_max;      /* of the computed ones */
-    double most;                            /* nearness, rounded towards the eye */
-    double near_size;                       /* largest absolute nearness */
-} corners;
-
-/* World vertices, relative to the eye, component by component; the last one again up to a whole vector. */
-static uint32_t place(const umb_raster_map *map, const umb_occluder *o, double d[3][UMB_CONVEX_VERTICES])
+/* World vertices relative to the eye, component by component; the last one again up to a whole vector. */
+static void approach(umb_silhouette *s, const umb_raster_map *map, const umb_occluder *o)
 {
     const umb_mesh *mesh = o->mesh;
     uint32_t count = mesh->block_position_count;
@@ -154,30 +133,55 @@ static uint32_t place(const umb_raster_map *map, const umb_occluder *o, double d
             umb_transform_point(&o->transform, p, world);
             p = world;
         }
-        d[0][v] = p[0] - map->eye.x;
-        d[1][v] = p[1] - map->eye.y;
-        d[2][v] = p[2] - map->eye.z;
+        s->d[0][v] = p[0] - map->eye.x;
+        s->d[1][v] = p[1] - map->eye.y;
+        s->d[2][v] = p[2] - map->eye.z;
     }
-    uint32_t whole = (count + UMB_WIDE - 1) & ~(uint32_t)(UMB_WIDE - 1);
-    for (uint32_t v = count; v < whole; ++v) {
+    s->vertex_count = count;
+    s->padded_count = (count + UMB_WIDE - 1) & ~(uint32_t)(UMB_WIDE - 1);
+    for (uint32_t v = count; v < s->padded_count; ++v) {
         for (int axis = 0; axis < 3; ++axis) {
-            d[axis][v] = d[axis][count - 1];
+            s->d[axis][v] = s->d[axis][count - 1];
         }
     }
-    return whole;
 }
 
-/* Bounds of section 3, for several vertices at once. False if one of them may be nearer than the cut. */
-static bool project_corners(const umb_raster_map *m, const double d[3][UMB_CONVEX_VERTICES], uint32_t count,
-                            corners *out)
+/* The cut is placed 64 units of the mesh's reach beyond near_cut: then what is kept, rounding included, is
+ * truly beyond it, and W is large enough for the bounds of a division. */
+static void find_cut(umb_silhouette *s, const umb_raster_map *m)
 {
-    umb_dv x_min = umb_dv_set(INFINITY), y_min = x_min, most = -x_min;
-    umb_dv x_max = -x_min, y_max = -x_min, error = umb_dv_set(0.0), reach_most = error, w_min = x_min;
-    umb_dv near_size = error;
-    for (uint32_t v = 0; v < count; v += UMB_WIDE) {
-        umb_dv dx = umb_dv_load(d[0] + v), dy = umb_dv_load(d[1] + v), dz = umb_dv_load(d[2] + v);
-        umb_dv reach = (umb_dv_abs(dx) + umb_dv_abs(dy)) + umb_dv_abs(dz);
+    umb_dv reach = umb_dv_set(0.0), w_min = umb_dv_set(INFINITY), w_max = -w_min;
+    for (uint32_t v = 0; v < s->padded_count; v += UMB_WIDE) {
+        umb_dv dx = umb_dv_load(s->d[0] + v), dy = umb_dv_load(s->d[1] + v), dz = umb_dv_load(s->d[2] + v);
         umb_dv w = (m->w.x * dx + m->w.y * dy) + m->w.z * dz;
+        umb_dv_store(s->w + v, w);
+        reach = umb_dv_max(reach, (umb_dv_abs(dx) + umb_dv_abs(dy)) + umb_dv_abs(dz));
+        w_min = umb_dv_min(w_min, w);
+        w_max = umb_dv_max(w_max, w);
+    }
+    s->reach = -umb_dv_least(-reach);
+    s->cut_depth = m->near_cut + 64.0 * UMB_U * (s->reach + fabs(m->near_cut));
+    s->cut = umb_dv_least(w_min) < s->cut_depth;
+    s->any = -umb_dv_least(-w_max) >= s->cut_depth;
+}
+
+/* Bounds of section 3, for several vertices at once. What is cut away is left out of extremes by making it a copy
+ * of the cut depth in its own direction: no infinity arises, and nobody looks at it. */
+static void place(umb_silhouette *s, const umb_raster_map *m, const umb_occluder *o)
+{
+    approach(s, m, o);
+    find_cut(s, m);
+    if (!s->any) {
+        return;
+    }
+    umb_dv huge = umb_dv_set(INFINITY), zero = umb_dv_set(0.0), cut = umb_dv_set(s->cut_depth);
+    umb_dv x_min = huge, y_min = huge, x_max = -huge, y_max = -huge, most = -huge, least = huge;
+    umb_dv error = zero, near_size = zero;
+    for (uint32_t v = 0; v < s->padded_count; v += UMB_WIDE) {
+        umb_dv dx = umb_dv_load(s->d[0] + v), dy = umb_dv_load(s->d[1] + v), dz = umb_dv_load(s->d[2] + v);
+        umb_dv reach = (umb_dv_abs(dx) + umb_dv_abs(dy)) + umb_dv_abs(dz);
+        umb_dv w = umb_dv_load(s->w + v);
+        umb_lv keep = w >= cut;
         umb_dv x = (m->x.x * dx + m->x.y * dy) + m->x.z * dz;
         umb_dv y = (m->y.x * dx + m->y.y * dy) + m->y.z * dz;
         umb_dv off = (5.0 * UMB_U) * reach;
@@ -190,7 +194,7 @@ static bool project_corners(const umb_raster_map *m, const double d[3][UMB_CONVE
             near_least -= (4.0 * UMB_U) * umb_dv_abs(near_least);
             near_most = off - w;
         } else {
-            umb_dv r = 1.0 / w;
+            umb_dv r = 1.0 / umb_dv_select(keep, w, cut);
             x *= r;
             y *= r;
             umb_dv a = umb_dv_abs(x) + umb_dv_abs(y);
@@ -202,37 +206,35 @@ static bool project_corners(const umb_raster_map *m, const double d[3][UMB_CONVE
             near_least = r - r * (2.0 * off * r + 4.0 * UMB_U);
             near_most = r + r * (2.0 * off * r + 4.0 * UMB_U);
         }
-        umb_dv_store(out->x + v, x);
-        umb_dv_store(out->y + v, y);
-        umb_dv_store(out->near_least + v, near_least);
-        umb_dv_store(out->near_most + v, near_most);
-        most = umb_dv_max(most, near_most);
-        near_size = umb_dv_max(near_size, umb_dv_max(umb_dv_abs(near_least), umb_dv_abs(near_most)));
-        error = umb_dv_max(error, e);
-        reach_most = umb_dv_max(reach_most, reach);
-        w_min = umb_dv_min(w_min, w);
-        x_min = umb_dv_min(x_min, x);
-        y_min = umb_dv_min(y_min, y);
-        x_max = umb_dv_max(x_max, x);
-        y_max = umb_dv_max(y_max, y);
+        umb_dv_store(s->x + v, x);
+        umb_dv_store(s->y + v, y);
+        umb_dv_store(s->off + v, e);
+        umb_dv_store(s->near_least + v, near_least);
+        umb_dv_store(s->near_most + v, near_most);
+        umb_dv size = umb_dv_max(umb_dv_abs(near_least), umb_dv_abs(near_most));
+        near_size = umb_dv_max(near_size, umb_dv_select(keep, size, zero));
+        error = umb_dv_max(error, umb_dv_select(keep, e, zero));
+        most = umb_dv_max(most, umb_dv_select(keep, near_most, -huge));
+        least = umb_dv_min(least, umb_dv_select(keep, near_least, huge));
+        x_min = umb_dv_min(x_min, umb_dv_select(keep, x, huge));
+        y_min = umb_dv_min(y_min, umb_dv_select(keep, y, huge));
+        x_max = umb_dv_max(x_max, umb_dv_select(keep, x, -huge));
+        y_max = umb_dv_max(y_max, umb_dv_select(keep, y, -huge));
     }
-    out->error = -umb_dv_least(-error);
-    out->x_min = umb_dv_least(x_min);
-    out->y_min = umb_dv_least(y_min);
-    out->x_max = -umb_dv_least(-x_max);
-    out->y_max = -umb_dv_least(-y_max);
-    out->most = -umb_dv_least(-most);
-    out->near_size = -umb_dv_least(-near_size);
-    double reach = -umb_dv_least(-reach_most);
-    double cut = m->near_cut + 64.0 * UMB_U * (reach + fabs(m->near_cut));
-    return umb_dv_least(w_min) >= cut && (m->orthographic || umb_dv_least(w_min) > 0x1p-20 * reach);
+    s->error = -umb_dv_least(-error);
+    s->near_size = -umb_dv_least(-near_size);
+    s->most = -umb_dv_least(-most);
+    s->far_corner = umb_dv_least(least);
+    s->x_min = umb_dv_least(x_min);
+    s->y_min = umb_dv_least(y_min);
+    s->x_max = -umb_dv_least(-x_max);
+    s->y_max = -umb_dv_least(-y_max);
 }
 
-/* Which triangles surely face the eye, a bit each. With rows that turn right-handed, a triangle whose corners
- * run counter-clockwise as seen has a negative area on the raster (y grows downwards). Corners are off by
- * error e in each coordinate: the area by 2 e S + 8 e^2 with S the sum of the four differences, and by
- * 8 units of S^2 for rounding. */
-static uint32_t find_front(const umb_raster_map *map, const umb_occluder *o, const corners *c)
+/* ---- convex shapes: set-up ------------------------------------------------------------------ */
+
+/* Which triangles surely face the eye, a bit each: silhouette.c has the bound. */
+static uint32_t find_front(const umb_raster_map *map, const umb_occluder *o, const umb_silhouette *c)
 {
     const umb_mesh *mesh = o->mesh;
     double turn = o->mirrored ? map->turn : -map->turn;
@@ -252,8 +254,8 @@ static uint32_t find_front(const umb_raster_map *map, const umb_occluder *o, con
 }
 
 /* The silhouette: edges of which one side faces the eye. */
-static bool find_lines(umb_convex *out, const umb_raster_map *map, const umb_occluder *o, const corners *c,
-                       uint32_t front, umb_convex_frame *frame)
+static bool find_lines(umb_convex *out, const umb_raster_map *map, const umb_occluder *o,
+                       const umb_silhouette *c, uint32_t front, umb_convex_frame *frame)
 {
     const umb_mesh *mesh = o->mesh;
     int turn = o->mirrored ? -map->turn : map->turn;
@@ -275,12 +277,12 @@ static bool find_lines(umb_convex *out, const umb_raster_map *map, const umb_occ
 }
 
 /* Move the outer lines until no corner is beyond them. */
-static void hold_corners(umb_convex_lines *lines, const corners *c, uint32_t count, double height, double side)
+static void hold_corners(umb_convex_lines *lines, const umb_silhouette *c, double height, double side)
 {
     for (uint32_t i = 0; i < lines->count; ++i) {
         double slope = lines->slope[i];
         umb_dv beyond = umb_dv_set(-INFINITY);
-        for (uint32_t v = 0; v < count; v += UMB_WIDE) {
+        for (uint32_t v = 0; v < c->padded_count; v += UMB_WIDE) {
             umb_dv x = umb_dv_load(c->x + v), y = umb_dv_load(c->y + v);
             beyond = umb_dv_max(beyond, side * (x - slope * y));
         }
@@ -291,128 +293,61 @@ static void hold_corners(umb_convex_lines *lines, const corners *c, uint32_t cou
     }
 }
 
-/* The plane of a triangle as the raster has it: the affine function through its computed corners, whatever
- * their errors, moved until it is nowhere above the nearness of the true ones (low), or nowhere below that of any
- * corner of the body (high). */
-typedef struct plane {
-    double gx, gy, low, high, least;
-} plane;
-
-/* How much gx x + gy y may be off at a corner. */
-static double plane_error(const plane *p, const corners *c)
-{
-    double size = fabs(p->gx) * (fabs(c->x_min) + fabs(c->x_max)) + fabs(p->gy) * (fabs(c->y_min) + fabs(c->y_max));
-    return (fabs(p->gx) + fabs(p->gy)) * c->error + 0x1p-50 * (size + c->near_size);
-}
-
-static double least_of_triangle(const corners *c, const uint32_t k[3])
-{
-    double a = c->near_least[k[0]], b = c->near_least[k[1]], d = c->near_least[k[2]];
-    a = a < b ? a : b;
-    return a < d ? a : d;
-}
-
-/* The least and the greatest of near_least - (gx x + gy y) at a triangle's corners. */
-static void plane_offsets(const plane *p, const corners *c, const uint32_t k[3], double *least, double *most)
-{
-    *least = INFINITY;
-    *most = -INFINITY;
-    for (int i = 0; i < 3; ++i) {
-        double at = c->near_least[k[i]] - (p->gx * c->x[k[i]] + p->gy * c->y[k[i]]);
-        *least = at < *least ? at : *least;
-        *most = at > *most ? at : *most;
-    }
-}
-
-static void plane_of(plane *p, const corners *c, const uint32_t k[3])
-{
-    double x1 = c->x[k[1]] - c->x[k[0]], y1 = c->y[k[1]] - c->y[k[0]];
-    double x2 = c->x[k[2]] - c->x[k[0]], y2 = c->y[k[2]] - c->y[k[0]];
-    double z1 = c->near_least[k[1]] - c->near_least[k[0]], z2 = c->near_least[k[2]] - c->near_least[k[0]];
-    double scale = 1.0 / (x1 * y2 - x2 * y1), most;
-    p->gx = (z1 * y2 - z2 * y1) * scale;
-    p->gy = (z2 * x1 - z1 * x2) * scale;
-    p->least = least_of_triangle(c, k);
-    plane_offsets(p, c, k, &p->low, &most);
-    p->low -= plane_error(p, c);
-}
-
-/* Two triangles of one flat side share a plane: the second lowers the first by what it must. */
-static bool share_plane(plane *planes, uint32_t count, const corners *c, const uint32_t k[3])
-{
-    for (uint32_t i = 0; i < count; ++i) {
-        plane *p = &planes[i];
-        double least, most, alike = 0x1p-12 * fabs(p->least);
-        plane_offsets(p, c, k, &least, &most);
-        if (fabs(least - p->low) < alike && fabs(most - p->low) < alike) {
-            least -= plane_error(p, c);
-            p->low = least < p->low ? least : p->low;
-            double far_corner = least_of_triangle(c, k);
-            p->least = far_corner < p->least ? far_corner : p->least;
-            return true;
-        }
-    }
-    return false;
-}
-
-static void raise_plane(plane *p, const corners *c, uint32_t count)
+/* What must be added to a plane so that it is nowhere below the nearness of any vertex. */
+static double plane_height(const umb_silhouette *c, const umb_silhouette_plane *p)
 {
     umb_dv above = umb_dv_set(-INFINITY);
-    for (uint32_t v = 0; v < count; v += UMB_WIDE) {
+    for (uint32_t v = 0; v < c->padded_count; v += UMB_WIDE) {
         umb_dv at = p->gx * umb_dv_load(c->x + v) + p->gy * umb_dv_load(c->y + v);
         above = umb_dv_max(above, umb_dv_load(c->near_most + v) - at);
     }
-    p->high = -umb_dv_least(-above) + plane_error(p, c);
+    return -umb_dv_least(-above) + umb_silhouette_plane_error(c, p, c->error);
 }
 
-/* Images of fewer pixels than this take one depth, their farthest corner's. */
-#define PLANE_PIXELS 128.0
-
-static void find_planes(umb_convex *out, const umb_raster_map *map, const umb_occluder *o, const corners *c,
-                        uint32_t vertices, uint32_t front)
+static void find_planes(umb_convex *out, const umb_raster_map *map, const umb_occluder *o,
+                        const umb_silhouette *c, uint32_t front)
 {
-    plane planes[UMB_CONVEX_TRIANGLES];
+    umb_silhouette_plane planes[UMB_CONVEX_TRIANGLES];
     uint32_t count = 0;
     double least = INFINITY;
-    bool small = (out->x_max - out->x_min) * ((double)out->row1 - out->row0 + 1.0) < PLANE_PIXELS;
+    bool small = (out->x_max - out->x_min) * ((double)out->row1 - out->row0 + 1.0) < UMB_PLANE_PIXELS;
     out->plane_count = 0;
     for (uint32_t left = front; left != 0; left &= left - 1) {
-        const uint32_t *k = o->mesh->triangles[__builtin_ctz(left)];
-        if (small) {
-            double z = least_of_triangle(c, k);
-            least = z < least ? z : least;
-        } else if (!share_plane(planes, count, c, k)) {
-            plane_of(&planes[count++], c, k);
+        uint32_t i = (uint32_t)__builtin_ctz(left);
+        const uint32_t *k = o->mesh->triangles[i];
+        bool shared = false;
+        for (int j = 0; j < 3; ++j) {
+            least = c->near_least[k[j]] < least ? c->near_least[k[j]] : least;
+        }
+        for (uint32_t p = 0; p < count && !shared && !small; ++p) {
+            shared = umb_silhouette_shares_plane(c, &planes[p], k);
+        }
+        if (!shared && !small) {
+            umb_silhouette_plane_of(c, map, o, i, &planes[count++]);
         }
     }
     if (small && front != 0) {
         umb_convex_add_plane(out, map, 0.0, 0.0, least, c->most, least);
     }
     for (uint32_t i = 0; i < count; ++i) {
-        raise_plane(&planes[i], c, vertices);
-        umb_convex_add_plane(out, map, planes[i].gx, planes[i].gy, planes[i].low, planes[i].high,
-                             planes[i].least);
+        const umb_silhouette_plane *p = &planes[i];
+        umb_convex_add_plane(out, map, p->gx, p->gy, p->low, plane_height(c, p), p->far_corner);
     }
 }
 
-static umb_convex_result find_convex(const umb_raster_map *map, const umb_occluder *o, umb_convex *out)
+static umb_convex_result find_convex(const umb_raster_map *map, const umb_occluder *o,
+                                     const umb_silhouette *c, umb_convex *out)
 {
-    double d[3][UMB_CONVEX_VERTICES];
-    corners c;
-    uint32_t count = place(map, o, d);
-    if (!project_corners(map, (const double(*)[UMB_CONVEX_VERTICES])d, count, &c)) {
+    uint32_t front = find_front(map, o, c);
+    umb_convex_frame frame = {c->error, c->x_max - c->x_min, map->height, c->y_min, c->y_max};
+    if (!find_lines(out, map, o, c, front, &frame)) {
         return UMB_CONVEX_OTHER;
     }
-    uint32_t front = find_front(map, o, &c);
-    umb_convex_frame frame = {c.error, c.x_max - c.x_min, map->height, c.y_min, c.y_max};
-    if (!find_lines(out, map, o, &c, front, &frame)) {
-        return UMB_CONVEX_OTHER;
-    }
-    hold_corners(&out->left, &c, count, map->height, -1.0);
-    hold_corners(&out->right, &c, count, map->height, 1.0);
-    bool covers = umb_convex_place(out, map, &frame, c.x_min, c.x_max);
-    out->most = (float)(c.most + 0x1p-22 * fabs(c.most));
-    find_planes(out, map, o, &c, count, front);
+    hold_corners(&out->left, c, map->height, -1.0);
+    hold_corners(&out->right, c, map->height, 1.0);
+    bool covers = umb_convex_place(out, map, &frame, c->x_min, c->x_max);
+    out->most = (float)(c->most + 0x1p-22 * fabs(c->most));
+    find_planes(out, map, o, c, front);
     return covers ? UMB_CONVEX_READY : UMB_CONVEX_NOTHING;
 }
 
@@ -610,5 +545,329 @@ static bool hides_convex(const umb_coverage *c, const umb_raster_map *map, const
     return true;
 }
 
-const umb_raster_kernels KERNELS = {ISA,         hides,       hides_rect,  merge,
-                                    find_convex, fill_convex, hides_convex};
+/* ---- any mesh ------------------------------------------------------------------------------- */
+
+/* One tile of the row of tiles that is being filled: pixels that an edge touches; how often the outline winds
+ * around each pixel more than around the one left of it, summed from the tile's left border, modulo 8, in three
+ * planes of bits; what is covered, and its depth: the least of all triangles that touch a sub-tile, and the
+ * greatest of those that hold all of it.
+ *
+ * Where no edge passes, the winding number is the number of front triangles over the pixel: never negative, so
+ * that it is not 0 if it is not 0 modulo 8; eight layers exactly count as none, which is safe. */
+struct umb_row_tile {
+    umb_iv touched[UMB_PARTS], one[UMB_PARTS], two[UMB_PARTS], four[UMB_PARTS];
+    umb_iv mask[UMB_PARTS], wanted[UMB_PARTS];
+    umb_fv z[UMB_PARTS], held[UMB_PARTS];
+};
+
+typedef struct row_window {
+    struct umb_row_tile *tiles; /* from the first column of the raster on */
+    uint8_t *edged;             /* tiles that an edge has written to */
+    uint32_t tx0, tx1;
+} row_window;
+
+/* Pixels touched by an edge in eight rows, and the column from which on it counts; both as columns from first on,
+ * cut to the window [first, end). */
+typedef struct edge_spans {
+    umb_iv left, right; /* touched: left up to right */
+    umb_iv column, crosses;
+} edge_spans;
+
+static inline edge_spans span_edge(const umb_outline_edge *e, const double *edge, int part, double first,
+                                   double end)
+{
+    umb_dv left[2], right[2], column[2];
+    umb_lv near_row[2], crossed[2];
+    umb_dv y_min = umb_dv_set(e->y_min), y_max = umb_dv_set(e->y_max);
+    umb_dv x_min = umb_dv_set(e->x_top < e->x_low ? e->x_top : e->x_low);
+    umb_dv x_max = umb_dv_set(e->x_top < e->x_low ? e->x_low : e->x_top);
+    umb_dv from = umb_dv_set(first), to = umb_dv_set(end);
+    for (int half = 0; half < 2; ++half) {
+        const double *at = edge + part * UMB_LANES + half * UMB_WIDE;
+        umb_dv top = umb_dv_load(at), low = umb_dv_load(at + 1);
+        umb_dv ya = umb_dv_min(umb_dv_max(top - e->error, y_min), y_max);
+        umb_dv yb = umb_dv_min(umb_dv_max(low + e->error, y_min), y_max);
+        umb_dv xa = e->x_top + (ya - y_min) * e->slope, xb = e->x_top + (yb - y_min) * e->slope;
+        umb_dv l = umb_dv_max(umb_dv_min(xa, xb), x_min), r = umb_dv_min(umb_dv_max(xa, xb), x_max);
+        if (e->flat) {
+            l = x_min;
+            r = x_max;
+        }
+        l -= e->error + 0x1p-30; /* a closed pixel ends where the next one begins */
+        r += e->error;
+        near_row[half] = (low + e->error >= y_min) & (top - e->error <= y_max) & (r >= from) & (l < to);
+        umb_dv middle = 0.5 * (top + low);
+        umb_dv x = umb_dv_min(umb_dv_max(e->x_top + (middle - y_min) * e->slope, x_min), x_max) + 1.0;
+        crossed[half] = (middle >= y_min) & (middle < y_max) & (x < to);
+        left[half] = umb_dv_min(umb_dv_max(l, from), to);
+        right[half] = umb_dv_min(umb_dv_max(r, from), to - 1.0);
+        column[half] = umb_dv_min(umb_dv_max(x, from), to);
+    }
+    edge_spans s;
+    umb_iv rows = umb_lv_narrow(near_row[0], near_row[1]);
+    s.left = umb_dv_trunc(left[0], left[1]);
+    s.right = (umb_dv_trunc(right[0], right[1]) + 1) & rows;
+    s.column = umb_dv_trunc(column[0], column[1]);
+    s.crosses = umb_lv_narrow(crossed[0], crossed[1]);
+    return s;
+}
+
+/* Add 1 or -1, modulo 8, to the pixels of a mask. */
+static inline void count_pixels(struct umb_row_tile *t, int part, umb_iv mask, bool up)
+{
+    umb_iv one = t->one[part], two = t->two[part];
+    umb_iv carry = mask & (up ? one : ~one);
+    umb_iv carry2 = carry & (up ? two : ~two);
+    t->one[part] = one ^ mask;
+    t->two[part] = two ^ carry;
+    t->four[part] ^= carry2;
+}
+
+/* The columns that an edge may reach within a row of tiles, scalar: its ends there, as span_edge has them. */
+static inline void edge_columns(const umb_outline_edge *e, const double *edge, double *low, double *high)
+{
+    double x_min = e->x_top < e->x_low ? e->x_top : e->x_low;
+    double x_max = e->x_top < e->x_low ? e->x_low : e->x_top;
+    *low = x_min;
+    *high = x_max;
+    if (!e->flat) {
+        double ya = edge[0] - e->error, yb = edge[8] + e->error;
+        ya = ya < e->y_min ? e->y_min : ya;
+        yb = yb > e->y_max ? e->y_max : yb;
+        double xa = e->x_top + (ya - e->y_min) * e->slope, xb = e->x_top + (yb - e->y_min) * e->slope;
+        double l = xa < xb ? xa : xb, r = xa < xb ? xb : xa;
+        *low = l > x_min ? l : x_min;
+        *high = r < x_max ? r : x_max;
+    }
+    /* One column on for the crossing, and one for rounding. */
+    *low -= e->error + 1.0;
+    *high += e->error + 2.0;
+}
+
+static inline void clear_tile(struct umb_row_tile *t)
+{
+    umb_iv zero = umb_iv_set(0);
+    for (int i = 0; i < UMB_PARTS; ++i) {
+        t->touched[i] = t->one[i] = t->two[i] = t->four[i] = zero;
+    }
+}
+
+static inline void draw_edge(const row_window *w, const umb_outline_edge *e, const double *edge)
+{
+    double first = w->tx0 * (double)UMB_TILE_WIDTH, end = (w->tx1 + 1.0) * UMB_TILE_WIDTH;
+    double low, high;
+    edge_columns(e, edge, &low, &high);
+    if (low >= end) {
+        return;
+    }
+    low = low > first ? low : first;
+    high = high > first ? high : first;
+    high = high < end - 1.0 ? high : end - 1.0;
+    uint32_t t0 = (uint32_t)low / UMB_TILE_WIDTH, t1 = (uint32_t)high / UMB_TILE_WIDTH;
+    edge_spans s[UMB_PARTS];
+    for (int i = 0; i < UMB_PARTS; ++i) {
+        s[i] = span_edge(e, edge, i, first, end);
+    }
+    int32_t times = e->count < 0 ? -e->count : e->count;
+    for (uint32_t tx = t0; tx <= t1; ++tx) {
+        struct umb_row_tile *t = &w->tiles[tx];
+        int32_t x = (int32_t)(tx * UMB_TILE_WIDTH);
+        if (w->edged[tx] == 0) {
+            w->edged[tx] = 1;
+            clear_tile(t);
+        }
+        for (int i = 0; i < UMB_PARTS; ++i) {
+            t->touched[i] |= span_mask(s[i].left, s[i].right, x);
+            umb_iv column = s[i].column - x;
+            umb_iv here = s[i].crosses & (column >= 0) & (column < UMB_TILE_WIDTH);
+            umb_iv on = here & ~low_bits(column & 31);
+            for (int32_t k = 0; k < times; ++k) {
+                count_pixels(t, i, on, e->count > 0);
+            }
+        }
+    }
+}
+
+/* What is covered in a row of tiles, left to right; the winding number at a tile's last column goes on into the
+ * next. Tiles without edges are all alike. True if some sub-tile is wanted: the occluder covers open pixels there,
+ * or closed ones perhaps from nearer. */
+static inline bool sweep(const umb_coverage *c, const row_window *w, size_t row, float most)
+{
+    umb_iv zero = umb_iv_set(0), wanted = zero;
+    umb_iv one[UMB_PARTS], two[UMB_PARTS], four[UMB_PARTS], inside[UMB_PARTS];
+    for (int i = 0; i < UMB_PARTS; ++i) {
+        one[i] = two[i] = four[i] = inside[i] = zero;
+    }
+    for (uint32_t tx = w->tx0; tx <= w->tx1; ++tx) {
+        struct umb_row_tile *t = &w->tiles[tx];
+        const umb_tile *tile = &c->tiles[row + tx];
+        bool edged = w->edged[tx] != 0;
+        bool closed = c->coarse[row + tx] >= most;
+        w->edged[tx] = 0;
+        for (int i = 0; i < UMB_PARTS; ++i) {
+            umb_iv mask = inside[i];
+            if (edged) {
+                umb_iv a = t->one[i] ^ one[i], carry = t->one[i] & one[i];
+                umb_iv half = t->two[i] ^ two[i];
+                umb_iv b = half ^ carry;
+                carry = (t->two[i] & two[i]) | (half & carry);
+                umb_iv d = t->four[i] ^ four[i] ^ carry;
+                mask = (a | b | d) & ~t->touched[i];
+                one[i] = a >> 31;
+                two[i] = b >> 31;
+                four[i] = d >> 31;
+                inside[i] = one[i] | two[i] | four[i];
+            }
+            int at = i * UMB_LANES;
+            umb_iv byte = umb_iv_load(SUB_BYTE + at);
+            umb_iv fresh = (umb_iv_or_fours(mask & ~umb_iv_load(tile->mask + at)) & byte) != 0;
+            umb_iv nearer = umb_fv_load(tile->z + at) < most;
+            umb_iv some = (umb_iv_or_fours(mask) & byte) != 0;
+            umb_iv want = closed ? zero : fresh | (some & nearer);
+            t->wanted[i] = want;
+            /* Pixels of sub-tiles that nothing is wanted of are dropped. */
+            t->mask[i] = mask & umb_iv_spread(want);
+            wanted |= want;
+        }
+    }
+    return umb_iv_any(wanted);
+}
+
+/* Depth where the triangles' own images decide: all that touch a sub-tile bound it together, from the farthest;
+ * one that holds all of it does so alone, however far the others are. */
+static inline void lower_row(const row_window *w, const umb_front_triangle *f, const double *edge)
+{
+    const float y[3] = {(float)edge[0], (float)edge[4], (float)edge[8]};
+    umb_fv most[3][UMB_PARTS], least[3][UMB_PARTS], plane[UMB_PARTS];
+    for (int i = 0; i < UMB_PARTS; ++i) {
+        umb_fv column = umb_fv_load(SUB_X + i * UMB_LANES);
+        for (int k = 0; k < 3 && f->sided; ++k) {
+            const float *far_end = f->ey[k] > 0.0f ? y + 1 : y, *near_end = f->ey[k] > 0.0f ? y : y + 1;
+            float far_x = f->ex[k] > 0.0f ? 8.0f : 0.0f, near_x = 8.0f - far_x;
+            most[k][i] = (f->most[k] + f->ey[k] * umb_fv_fours(far_end[0], far_end[1], i)) +
+                         f->ex[k] * (column + far_x);
+            least[k][i] = (f->least[k] + f->ey[k] * umb_fv_fours(near_end[0], near_end[1], i)) +
+                          f->ex[k] * (column + near_x);
+        }
+        const float *end = f->gy < 0.0f ? y + 1 : y;
+        plane[i] = (f->low + f->gy * umb_fv_fours(end[0], end[1], i)) +
+                   f->gx * (column + (f->gx < 0.0f ? 8.0f : 0.0f));
+    }
+    uint32_t t0 = f->tx0 > w->tx0 ? f->tx0 : w->tx0, t1 = f->tx1 < w->tx1 ? f->tx1 : w->tx1;
+    for (uint32_t tx = t0; tx <= t1; ++tx) {
+        struct umb_row_tile *t = &w->tiles[tx];
+        float x = (float)(tx * UMB_TILE_WIDTH);
+        for (int i = 0; i < UMB_PARTS; ++i) {
+            umb_iv touches = t->wanted[i], holds = umb_iv_set(0);
+            if (!umb_iv_any(touches)) {
+                continue;
+            }
+            if (f->sided) {
+                holds = touches;
+                for (int k = 0; k < 3; ++k) {
+                    touches &= ~(most[k][i] + f->ex[k] * x < 0.0f);
+                    holds &= least[k][i] + f->ex[k] * x > 0.0f;
+                }
+            }
+            umb_fv z = umb_fv_max(plane[i] + f->gx * x, umb_fv_set(f->far_corner));
+            t->z[i] = umb_fv_select(touches & (z < t->z[i]), z, t->z[i]);
+            t->held[i] = umb_fv_select(holds & (z > t->held[i]), z, t->held[i]);
+        }
+    }
+}
+
+/* Depth where one plane holds for all triangles. */
+static inline void lower_row_by_plane(const row_window *w, const umb_front_triangle *f, const double *edge)
+{
+    const float y[3] = {(float)edge[0], (float)edge[4], (float)edge[8]};
+    const float *end = f->gy < 0.0f ? y + 1 : y;
+    for (int i = 0; i < UMB_PARTS; ++i) {
+        umb_fv column = umb_fv_load(SUB_X + i * UMB_LANES) + (f->gx < 0.0f ? 8.0f : 0.0f);
+        umb_fv plane = (f->low + f->gy * umb_fv_fours(end[0], end[1], i)) + f->gx * column;
+        for (uint32_t tx = w->tx0; tx <= w->tx1; ++tx) {
+            float x = (float)(tx * UMB_TILE_WIDTH);
+            w->tiles[tx].z[i] = umb_fv_max(plane + f->gx * x, umb_fv_set(f->far_corner));
+        }
+    }
+}
+
+static inline bool merge_row(umb_coverage *c, const row_window *w, size_t row, bool held)
+{
+    bool changed = false;
+    for (uint32_t tx = w->tx0; tx <= w->tx1; ++tx) {
+        struct umb_row_tile *t = &w->tiles[tx];
+        tile_part parts[UMB_PARTS];
+        umb_iv any = umb_iv_set(0);
+        for (int i = 0; i < UMB_PARTS; ++i) {
+            parts[i].mask = t->mask[i];
+            parts[i].z = held ? umb_fv_max(t->z[i], t->held[i]) : t->z[i];
+            any |= t->mask[i];
+        }
+        if (umb_iv_any(any)) {
+            changed |= merge_parts(c, row + tx, parts);
+        }
+    }
+    return changed;
+}
+
+static bool fill_mesh(umb_coverage *c, const umb_raster_map *map, umb_silhouette *s, umb_mesh_fill *fill)
+{
+    row_window w = {fill->tiles, fill->edged, fill->tx0, fill->tx1};
+    umb_fv far = umb_fv_set(INFINITY);
+    float most = (float)(s->most + 0x1p-22 * fabs(s->most));
+    uint32_t edges = UMB_NONE, triangles = UMB_NONE; /* those that this row of tiles meets */
+    bool changed = false, by_plane = fill->by_plane;
+    for (uint32_t ty = fill->ty0; ty <= fill->ty1; ++ty) {
+        const double *edge = map->rows.edge + (size_t)ty * UMB_TILE_HEIGHT;
+        size_t row = (size_t)ty * c->columns;
+        /* The lists of this row join what is still there of those before. */
+        for (uint32_t i = fill->edges[ty], next; i != UMB_NONE; i = next) {
+            next = s->edges[i].next;
+            s->edges[i].next = edges;
+            edges = i;
+        }
+        for (uint32_t *at = &edges; *at != UMB_NONE;) {
+            umb_outline_edge *e = &s->edges[*at];
+            draw_edge(&w, e, edge);
+            if (e->row1 <= ty) {
+                *at = e->next;
+            } else {
+                at = &e->next;
+            }
+        }
+        bool wanted = sweep(c, &w, row, most);
+        if (!by_plane) {
+            for (uint32_t i = fill->triangles[ty], next; i != UMB_NONE; i = next) {
+                next = s->triangles[i].next;
+                s->triangles[i].next = triangles;
+                triangles = i;
+            }
+            for (uint32_t tx = w.tx0; tx <= w.tx1 && wanted; ++tx) {
+                for (int i = 0; i < UMB_PARTS; ++i) {
+                    w.tiles[tx].z[i] = far;
+                    w.tiles[tx].held[i] = -far;
+                }
+            }
+            for (uint32_t *at = &triangles; *at != UMB_NONE;) {
+                umb_front_triangle *f = &s->triangles[*at];
+                if (wanted) {
+                    lower_row(&w, f, edge);
+                }
+                if (f->ty1 <= ty) {
+                    *at = f->next;
+                } else {
+                    at = &f->next;
+                }
+            }
+        } else if (wanted) {
+            lower_row_by_plane(&w, &s->triangles[0], edge);
+        }
+        if (wanted) {
+            changed |= merge_row(c, &w, row, !by_plane);
+        }
+    }
+    return changed;
+}
+
+const umb_raster_kernels KERNELS = {ISA,         hides,       hides_rect,   place,
+                                    find_convex, fill_convex, hides_convex, fill_mesh};
