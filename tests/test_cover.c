@@ -32,7 +32,8 @@ static void compare(const model *m, truth *oracle, const umb_view *view, const c
             continue;
         }
         truth_witness w;
-        cover_verdict verdict = oracle_cover(oracle, &v, i / 2, (uint8_t)(1u << i % 2), &w);
+        cover_verdict verdict = oracle_cover(oracle, &v, i / 2, (uint8_t)(1u << i % 2),
+                                             COVER_ACCUSED, &w);
         bool seen = proof->confirmed != 0;
         if (seen && verdict == COVER_HIDDEN) {
             printf(

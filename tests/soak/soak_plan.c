@@ -60,7 +60,7 @@ static bool add(soak_plan *p, const scene_row *row, soak_style style, double vie
     part->weld = row->weld;
     part->most_targets = style == SOAK_MICRO ? 4000 : 400;
     part->rays = style == SOAK_MICRO ? 60000 : 100000;
-    part->most_decided = 16;
+    part->most_decided = style == SOAK_ADVERSARIAL ? 8 : 16;
     return true;
 }
 

@@ -46,13 +46,15 @@ typedef struct cover {
     uint8_t renderer;
     covector *lines;
     uint32_t line_count;
-    uint32_t side_line[3][2]; /* of the blocker at hand, either way round; 0: not in the list */
+    /* Lines of the blocker at hand, by one more than their numbers; 0: not in the list. */
+    uint32_t side_line[3][2]; /* along its sides, either way round */
+    uint32_t meet_line;       /* where it passes through the target */
     piece *pieces;
     uint32_t piece_count;
     suspect *suspects;
     uint32_t suspect_count;
     double rect[2][2], deepest; /* image of the triangle in slopes, and how deep it is */
-    uint32_t cuts, tried;
+    uint32_t effort, shades, cuts, tried;
 } cover;
 
 /* ---- pieces ---- */
@@ -144,17 +146,38 @@ static cut_result cut_away(cover *c, piece *p, const covector *f)
     return CUT_INSIDE;
 }
 
-/* Does the blocker lie before the triangle, and beyond the near plane, all over the piece? */
-static bool hides_piece(cover *c, const piece *p, const shade *blocker, const shade *target)
+typedef enum hides { HIDES_NOT, HIDES_IN_PART, HIDES } hides;
+
+/* Does the blocker lie before the triangle, and beyond the near plane, all over the piece? In part:
+ * beyond the near plane it is everywhere, before the triangle only at some corners. */
+static hides hides_piece(cover *c, const piece *p, const shade *blocker, const shade *target)
 {
+    uint32_t nearer = 0;
     for (uint32_t i = 0; i < p->count; ++i) {
         const covector *l = &c->lines[p->line[i]], *m = &c->lines[p->line[(i + 1) % p->count]];
-        if (!shade_nearer(&c->space, blocker, target, l, m) ||
-            (blocker->crosses_near && shade_sign(&c->space, &blocker->beyond, l, m) < 0)) {
-            return false;
+        nearer += shade_nearer(&c->space, blocker, target, l, m);
+        if (blocker->crosses_near && shade_sign(&c->space, &blocker->beyond, l, m) < 0) {
+            return HIDES_NOT;
         }
     }
-    return true;
+    return nearer == p->count ? HIDES : nearer != 0 ? HIDES_IN_PART : HIDES_NOT;
+}
+
+/* The part of the piece where the blocker is not before the triangle: the two pass through one
+ * another. False when that has no inside: then the line where they meet belongs to no piece that is
+ * left, and is no blocker's either. */
+static bool not_before(cover *c, const piece *p, const shade *blocker, const shade *target,
+                       piece *out)
+{
+    if (c->meet_line == 0) {
+        covector meet;
+        shade_behind(blocker, target, &meet);
+        c->meet_line = 1u + add_line(c, &meet);
+    }
+    int at[MOST_SIDES];
+    uint16_t line = (uint16_t)(c->meet_line - 1);
+    signs_at_corners(c, p, &c->lines[line], at);
+    return part_of(c, p, at, 1, line, out);
 }
 
 /* The line along a side of the blocker at hand, positive inside it or, with back, outside. */
@@ -175,7 +198,7 @@ static uint16_t side_line(cover *c, const shade *blocker, int s, int back)
  * False when nothing is taken. */
 static bool subtract(cover *c, uint32_t k, const shade *blocker, const shade *target)
 {
-    piece rest[3], inside = c->pieces[k];
+    piece rest[4], inside = c->pieces[k];
     uint32_t rests = 0;
     for (int s = 0; s < 3; ++s) {
         int at[MOST_SIDES];
@@ -197,7 +220,14 @@ static bool subtract(cover *c, uint32_t k, const shade *blocker, const shade *ta
         }
         inside = in;
     }
-    if (!hides_piece(c, &inside, blocker, target)) {
+    hides how = hides_piece(c, &inside, blocker, target);
+    if (how == HIDES_NOT || (how == HIDES_IN_PART && c->space.parallel)) {
+        return false; /* parallel: the line where they meet has too many bits */
+    }
+    if (how == HIDES_IN_PART && !not_before(c, &inside, blocker, target, &rest[rests++])) {
+        return false;
+    }
+    if (c->space.lost) {
         return false;
     }
     c->pieces[k] = c->pieces[--c->piece_count];
@@ -335,6 +365,10 @@ static void cover_by_all(cover *c, const shade *target)
         double p[3][3];
         shade blocker;
         bool turned;
+        if (++c->shades > c->effort) {
+            c->space.lost = true;
+            return;
+        }
         oracle_triangle(c->t, b->object, b->triangle, v);
         shade_scale(&c->space, v, p);
         if (!shade_make(&c->space, p, &blocker, &turned) ||
@@ -345,6 +379,7 @@ static void cover_by_all(cover *c, const shade *target)
         uint32_t lines = c->line_count;
         bool taken = false;
         memset(c->side_line, 0, sizeof(c->side_line));
+        c->meet_line = 0;
         for (uint32_t k = c->piece_count; k-- > 0 && !c->space.lost;) {
             taken = subtract(c, k, &blocker, target) || taken;
             c->space.lost = c->space.lost || ++c->cuts > MOST_CUTS;
@@ -575,7 +610,7 @@ static cover_verdict cover_all(cover *c, truth_witness *out)
     cover_verdict all = COVER_HIDDEN;
     for (uint32_t k = 0; k < c->t->model->meshes[o->mesh].triangle_count; ++k) {
         cover_verdict one = cover_triangle(c, k, out);
-        if (one == COVER_SEEN || c->space.lost) {
+        if (one == COVER_SEEN || c->space.lost || (one == COVER_OPEN && c->effort <= COVER_ASKED)) {
             return one;
         }
         all = one == COVER_OPEN ? COVER_OPEN : all;
@@ -584,9 +619,9 @@ static cover_verdict cover_all(cover *c, truth_witness *out)
 }
 
 cover_verdict oracle_cover(const truth *t, const oracle_view *v, uint32_t object, uint8_t renderer,
-                           truth_witness *out)
+                           uint32_t effort, truth_witness *out)
 {
-    cover c = {.t = t, .object = object, .renderer = renderer};
+    cover c = {.t = t, .object = object, .renderer = renderer, .effort = effort};
     cover_verdict verdict = COVER_OPEN;
     c.lines = malloc(MOST_LINES * sizeof(*c.lines));
     c.pieces = malloc(MOST_PIECES * sizeof(*c.pieces));

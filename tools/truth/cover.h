@@ -10,8 +10,13 @@ typedef enum cover_verdict {
     COVER_SEEN    /* out holds a confirmed sight-line */
 } cover_verdict;
 
+/* How many blockers are looked at, over all of an object's triangles, before it is given up. */
+#define COVER_ACCUSED 100000u
+#define COVER_ASKED                                                                                \
+    500u /* for objects that nothing speaks against; also, the first open triangle ends it */
+
 /* For one renderer (TRUTH_*). */
 cover_verdict oracle_cover(const truth *t, const oracle_view *v, uint32_t object, uint8_t renderer,
-                           truth_witness *out);
+                           uint32_t effort, truth_witness *out);
 
 #endif

@@ -318,8 +318,9 @@ static void cover_item(worker *w, uint64_t item)
     uint32_t object = s->targets[item / 2];
     int r = (int)(item % 2);
     find *f = &s->finds[r][object], *leak = &s->leaks[r][object];
+    bool asked = item / 2 < s->asked;
     cover_verdict verdict = oracle_cover(s->t, &s->view, object, (uint8_t)(1u << r),
-                                         &s->proven[r][object]);
+                                         asked ? COVER_ASKED : COVER_ACCUSED, &s->proven[r][object]);
     s->verdicts[item] = (uint8_t)verdict;
     if (verdict == COVER_HIDDEN) {
         leak->refuted = leak->ray != NO_RAY;
@@ -349,6 +350,7 @@ static void decide(search *s, truth_result *out)
         add_accused(s, false);
         search_choose_nearest(s, s->options->most_decided);
     }
+    s->asked = s->target_count;
     add_accused(s, true);
     s->verdicts = calloc(2 * (size_t)s->target_count + 1, 1);
     if (!s->verdicts) {

@@ -64,7 +64,8 @@ typedef struct search {
     uint32_t grid_width, grid_height;
     truth_witness *proven[2]; /* per object: verified finds */
     find *leaks[2];           /* per object: the first refuted find, or NO_RAY */
-    uint8_t *verdicts;        /* cover_verdict, two per target of the last phase */
+    uint32_t asked; /* targets to be decided that nothing speaks against; suspected ones follow */
+    uint8_t *verdicts; /* cover_verdict, two per target of the last phase */
     worker *workers;
     uint32_t worker_count;
     uint64_t phase, round;

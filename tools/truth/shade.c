@@ -93,9 +93,10 @@ void shade_sight(const sight_space *c, const double p[3], exact out[3])
     exact_set(&out[2], 1.0);
 }
 
-/* The longest products (nearer_at) have eleven coordinates and two components of axes, or three such
- * components and nine coordinates; in parallel views each coordinate comes with a component of
- * forward. They must not lose a bit below 2^-1074, nor reach 2^990:
+/* The longest products have, with the signs at corners of the lines where planes meet (five
+ * coordinates each), fifteen coordinates, or nine and three components of axes times limits; in
+ * parallel views, which have no such lines, eleven coordinates, each with a component of forward.
+ * They must not lose a bit below 2^-1074, nor reach 2^990:
  *   perspective: coordinates have bits from 2^-66 to 2^41, axes times limits from 2^-101 to 2^124;
  *   parallel: coordinates from 2^-44 to 2^25, axes from 2^-50 to 2^60. */
 bool shade_holds(const sight_space *c, const double p[3])
@@ -184,6 +185,17 @@ void shade_spread(const shade *s, const exact value[3], covector *out)
         exact_add(&sum, &p, &q);
         exact_multiply(&p, &value[2], &s->side[2].n[i]);
         exact_add(&out->n[i], &sum, &p);
+    }
+    shade_about(out);
+}
+
+void shade_behind(const shade *a, const shade *b, covector *out)
+{
+    for (int i = 0; i < 3; ++i) {
+        exact p, q;
+        exact_multiply(&p, &b->nearness.n[i], &a->det);
+        exact_multiply(&q, &a->nearness.n[i], &b->det);
+        exact_subtract(&out->n[i], &p, &q);
     }
     shade_about(out);
 }

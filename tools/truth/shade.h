@@ -73,6 +73,8 @@ int shade_sign(sight_space *c, const covector *f, const covector *l, const covec
 /* Is a strictly nearer than b there? */
 bool shade_nearer(sight_space *c, const shade *a, const shade *b, const covector *l,
                   const covector *m);
+/* At least zero where a is no nearer than b: the line where the two planes meet. */
+void shade_behind(const shade *a, const shade *b, covector *out);
 
 void shade_about(covector *c); /* fill in about from n */
 void shade_dot(exact *out, const exact a[3], const exact b[3]);
