@@ -60,3 +60,39 @@ umb_convex_result umb_convex_of_silhouette(const umb_silhouette *s, const umb_ra
     out->most = (float)(s->most + 0x1p-22 * fabs(s->most));
     return UMB_CONVEX_READY;
 }
+
+/* The line of a side at which no corner is beyond it: of the two that are parallel to the side and hold the polygon
+ * the one near the side, whichever way round the corners run. Evaluating it is off by less than 16 units of its
+ * terms. */
+static void hold_outline(umb_convex *c, const umb_outline *o, double height, double x0, double y0, double slope)
+{
+    double least = INFINITY, most = -INFINITY, at = x0 - slope * y0, size = 0.0;
+    for (uint32_t i = 0; i < o->count; ++i) {
+        double v = o->x[i] - slope * o->y[i];
+        least = v < least ? v : least;
+        most = v > most ? v : most;
+        size = fabs(o->x[i]) + fabs(slope * o->y[i]) > size ? fabs(o->x[i]) + fabs(slope * o->y[i]) : size;
+    }
+    double off = o->error * (1.0 + fabs(slope)) + 16.0 * UMB_U * (size + fabs(slope) * height);
+    bool left = fabs(least - at) < fabs(most - at);
+    umb_convex_lines *lines = left ? &c->left : &c->right;
+    uint32_t i = lines->count++;
+    lines->slope[i] = slope;
+    lines->out_at[i] = left ? least - off : most + off;
+}
+
+void umb_convex_of_outline(const umb_outline *o, const umb_raster_map *map, umb_convex *out)
+{
+    out->left.count = out->right.count = out->plane_count = 0;
+    for (uint32_t i = 0; i < o->count; ++i) {
+        uint32_t k = i + 1 < o->count ? i + 1 : 0;
+        double dx = o->x[k] - o->x[i], dy = o->y[k] - o->y[i];
+        if (fabs(dy) > UMB_CONVEX_FLAT * fabs(dx)) {
+            hold_outline(out, o, map->height, o->x[i], o->y[i], dx / dy);
+        }
+    }
+    /* The plane's relative 2^-22 is less than this part of its largest value over the raster. */
+    double size = fabs(o->gx) * map->width + fabs(o->gy) * map->height + fabs(o->g0);
+    umb_convex_add_plane(out, map, o->gx, o->gy, o->g0, o->g0 + 0x1p-22 * size, o->most);
+    out->most = (float)(o->most + 0x1p-22 * fabs(o->most));
+}

@@ -110,6 +110,18 @@ static inline void umb_convex_add_plane(umb_convex *c, const umb_raster_map *map
     c->high[i] = fits ? (float)(high + 0x1p-21 * size) : INFINITY;
 }
 
+/* A convex polygon on the raster, each true corner within error of the given one in each
+ * coordinate, and its nearness: nowhere more than gx x + gy y + g0, nor than most. */
+typedef struct umb_outline {
+    double x[9], y[9];
+    uint32_t count;
+    double error;
+    double gx, gy, g0, most;
+} umb_outline;
+
+/* The lines and the plane that hold a polygon: what umb_raster_kernels.hides_convex needs. */
+void umb_convex_of_outline(const umb_outline *o, const umb_raster_map *map, umb_convex *out);
+
 /* The covered part of a convex occluder that the near cut goes through, from its general silhouette. Of the
  * result only what umb_raster_kernels.fill_convex needs is there. */
 umb_convex_result umb_convex_of_silhouette(const umb_silhouette *s, const umb_raster_map *map,

@@ -40,23 +40,9 @@ typedef struct umb_pixel_rect {
     int16_t x0, y0, x1, y1;
 } umb_pixel_rect;
 
-/* A convex polygon on the raster, each true corner within error of the given one in each
- * coordinate, and its nearness: nowhere more than gx x + gy y + g0, nor than most. */
-typedef struct umb_outline {
-    double x[9], y[9];
-    uint32_t count;
-    double error;
-    double gx, gy, g0, most;
-} umb_outline;
-
 /* Make room for a raster; reuses what is there. */
 bool umb_coverage_resize(umb_coverage *c, const umb_allocator *a, uint32_t width, uint32_t height);
 void umb_coverage_free(umb_coverage *c, const umb_allocator *a);
 void umb_coverage_clear(umb_coverage *c);
-
-/* True if every pixel of rect that an outline enters is covered by something nearer than the outline there.
- * edge: heights of the rows' boundaries (raster_map.h). Rectangles as such: raster_kernels.h. */
-bool umb_coverage_hides_outline(const umb_coverage *c, const double *edge, umb_pixel_rect rect,
-                                const umb_outline *outline);
 
 #endif

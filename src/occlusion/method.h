@@ -11,6 +11,7 @@
 #ifndef UMB_METHOD_H
 #define UMB_METHOD_H
 
+#include "convex.h"
 #include "coverage.h"
 #include "frustum/box_kernels.h"
 #include "raster_map.h"

@@ -107,10 +107,16 @@ static uint32_t hides(const void *state, const umb_projected *boxes, uint32_t ma
 static bool hidden(const void *state, const umb_image *image, const umb_outline *outline)
 {
     const raster *r = state;
-    return image->rect.x0 > image->rect.x1 ||
-           r->kernels->hides_rect(&r->coverage, image->rect, image->nearness) ||
-           (outline != NULL &&
-            umb_coverage_hides_outline(&r->coverage, r->map.rows.edge, image->rect, outline));
+    if (image->rect.x0 > image->rect.x1 ||
+        r->kernels->hides_rect(&r->coverage, image->rect, image->nearness)) {
+        return true;
+    }
+    if (outline == NULL) {
+        return false;
+    }
+    umb_convex polygon;
+    umb_convex_of_outline(outline, &r->map, &polygon);
+    return r->kernels->hides_convex(&r->coverage, &r->map, &polygon, image->rect);
 }
 
 static bool open_at(const void *state, double x, double y, double nearness)

@@ -652,7 +652,7 @@ static inline void clear_tile(struct umb_row_tile *t)
     }
 }
 
-static inline void draw_edge(const row_window *w, const umb_outline_edge *e, const double *edge)
+static __attribute__((noinline)) void draw_edge(const row_window *w, const umb_outline_edge *e, const double *edge)
 {
     double first = w->tx0 * (double)UMB_TILE_WIDTH, end = (w->tx1 + 1.0) * UMB_TILE_WIDTH;
     double low, high;
@@ -691,7 +691,7 @@ static inline void draw_edge(const row_window *w, const umb_outline_edge *e, con
 /* What is covered in a row of tiles, left to right; the winding number at a tile's last column goes on into the
  * next. Tiles without edges are all alike. True if some sub-tile is wanted: the occluder covers open pixels there,
  * or closed ones perhaps from nearer. */
-static inline bool sweep(const umb_coverage *c, const row_window *w, size_t row, float most)
+static __attribute__((noinline)) bool sweep(const umb_coverage *c, const row_window *w, size_t row, float most)
 {
     umb_iv zero = umb_iv_set(0), wanted = zero;
     umb_iv one[UMB_PARTS], two[UMB_PARTS], four[UMB_PARTS], inside[UMB_PARTS];
@@ -735,7 +735,7 @@ static inline bool sweep(const umb_coverage *c, const row_window *w, size_t row,
 
 /* Depth where the triangles' own images decide: all that touch a sub-tile bound it together, from the farthest;
  * one that holds all of it does so alone, however far the others are. */
-static inline void lower_row(const row_window *w, const umb_front_triangle *f, const double *edge)
+static __attribute__((noinline)) void lower_row(const row_window *w, const umb_front_triangle *f, const double *edge)
 {
     const float y[3] = {(float)edge[0], (float)edge[4], (float)edge[8]};
     umb_fv most[3][UMB_PARTS], least[3][UMB_PARTS], plane[UMB_PARTS];
@@ -777,7 +777,7 @@ static inline void lower_row(const row_window *w, const umb_front_triangle *f, c
 }
 
 /* Depth where one plane holds for all triangles. */
-static inline void lower_row_by_plane(const row_window *w, const umb_front_triangle *f, const double *edge)
+static __attribute__((noinline)) void lower_row_by_plane(const row_window *w, const umb_front_triangle *f, const double *edge)
 {
     const float y[3] = {(float)edge[0], (float)edge[4], (float)edge[8]};
     const float *end = f->gy < 0.0f ? y + 1 : y;
@@ -791,7 +791,7 @@ static inline void lower_row_by_plane(const row_window *w, const umb_front_trian
     }
 }
 
-static inline bool merge_row(umb_coverage *c, const row_window *w, size_t row, bool held)
+static __attribute__((noinline)) bool merge_row(umb_coverage *c, const row_window *w, size_t row, bool held)
 {
     bool changed = false;
     for (uint32_t tx = w->tx0; tx <= w->tx1; ++tx) {
