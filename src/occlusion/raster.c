@@ -228,6 +228,16 @@ static void list_depths(raster *r, const umb_occluder *o)
     }
 }
 
+/* What a mesh of fewer pixels than this across covers is not worth its many edges. */
+#define LEAST_PIXELS 4
+
+static bool is_tiny(const raster *r)
+{
+    const umb_silhouette *s = &r->silhouette;
+    return !s->cut && (s->x_max - s->x_min < LEAST_PIXELS ||
+                       umb_raster_map_row(&r->map, s->y_max) - umb_raster_map_row(&r->map, s->y_min) < LEAST_PIXELS);
+}
+
 static bool occlude(void *state, uint32_t occluder, umb_cull_stats *stats)
 {
     raster *r = state;
@@ -242,7 +252,7 @@ static bool occlude(void *state, uint32_t occluder, umb_cull_stats *stats)
         r->kernels->place(s, &r->map, o);
     }
     if (found == UMB_CONVEX_OTHER) {
-        if (!s->any || !umb_silhouette_find(s, &r->map, o)) {
+        if (!s->any || is_tiny(r) || !umb_silhouette_find(s, &r->map, o)) {
             return false;
         }
         found = body ? umb_convex_of_silhouette(s, &r->map, o, &r->convex) : UMB_CONVEX_OTHER;
