@@ -24,19 +24,19 @@ static const scene_row ROWS[] = {
     {"boxfield", "boxfield-200k", "gen:boxfield,polygons=200k", 0.0, true, 800, 500, 0, 0},
     {"boxfield", "boxfield-200k-moved", "gen:boxfield,polygons=200k", 50.0, true, 160, 300, 0, 0},
     {"city", "city-20M", "gen:city,triangles=20M", 0.0, true, 1600, 0, 0, 0},
-    {"city", "city-1M", "gen:city,triangles=1M", 0.0, true, 800, 500, 0, 0},
+    {"city", "city-1M", "gen:city,triangles=1M", 0.0, true, 800, 600, 0, 0},
     {"city", "city-200k-moved", "gen:city,triangles=200k", 50.0, true, 160, 300, 0, 0},
     {"building", "building-40", "gen:building,floors=40", 0.0, true, 800, 500, 0, 0},
     {"building", "building-1-moved", "gen:building,floors=1", 50.0, true, 160, 300, 0, 16},
     {"medley", "medley-1M", "medley:1000000", 0.0, true, 1200, 0, 0, 0},
-    {"medley", "medley-20k", "medley:20000", 0.0, false, 800, 500, 0, 0},
+    {"medley", "medley-20k", "medley:20000", 0.0, false, 800, 600, 0, 0},
     {"medley", "medley-2k", "medley:2000", 0.0, true, 400, 500, 16, 16},
     {"medley", "medley-2k-moved", "medley:2000", 5000.0, true, 160, 300, 0, 0},
 };
 enum { ROW_COUNT = sizeof ROWS / sizeof ROWS[0] };
 
 /* Views of each real scene, and of the micro scenes, two each. */
-enum { REAL_ORDINARY = 160, REAL_ADVERSARIAL = 240, MICRO_VIEWS = 6000, SHORT_MICRO = 48 };
+enum { REAL_ORDINARY = 160, REAL_ADVERSARIAL = 320, MICRO_VIEWS = 6000, SHORT_MICRO = 48 };
 
 static bool add(soak_plan *p, const scene_row *row, soak_style style, double views)
 {
