@@ -1,5 +1,5 @@
 /* The long run: many views of many scenes, each answered by a culler and held against the oracle.
- * main.c says how it is used. */
+ * soak.c says how it is used. */
 #ifndef SOAK_H
 #define SOAK_H
 

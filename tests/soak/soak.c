@@ -256,7 +256,7 @@ int main(int count, char **words)
     umb_error error = {0};
     if (!read_settings(count, words, &s)) {
         (void)fprintf(stderr, "soak: what is asked for is no option, or lacks a value: "
-                              "see the head of tests/soak/main.c\n");
+                              "see the head of tests/soak/soak.c\n");
         return USAGE;
     }
     (void)mkdir(s.out, 0777);
