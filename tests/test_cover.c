@@ -63,7 +63,7 @@ static void test_micro_scenes(void **state)
                      : size != NULL && size[0] == 's' ? 30
                                                       : 120;
     tally sums[16] = {{0}};
-    uint64_t wrong = 0, decided = 0, open = 0;
+    uint64_t wrong = 0, decided = 0;
     for (uint64_t i = 0; i < count; ++i) {
         micro_scene s;
         umb_error error = {0};
@@ -83,7 +83,6 @@ static void test_micro_scenes(void **state)
                (unsigned long long)c->open, (unsigned long long)c->found);
         wrong += c->wrong;
         decided += c->hidden;
-        open += c->open;
     }
     assert_int_equal(wrong, 0);
     assert_true(decided > 0);
