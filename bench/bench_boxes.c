@@ -135,7 +135,7 @@ static void prepare_projectors(job *j)
             memset(view.vertical, 0, sizeof(view.vertical));
         }
         view.projection = form == PARALLEL ? UMB_ORTHOGRAPHIC : UMB_PERSPECTIVE;
-        umb_raster_map_prepare(&map, &view, table);
+        umb_raster_map_prepare(&map, &view, NULL, table);
         const umb_vec3 rows[3] = {map.x, map.y, map.w};
         double *out[3] = {x, y, w};
         for (int i = 0; i < 3; ++i) {

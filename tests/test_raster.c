@@ -154,7 +154,7 @@ static void test_invariant(void **state)
         micro.view.buffer_height = 45;
         umb_raster_map map;
         double rows[53];
-        umb_raster_map_prepare(&map, &micro.view, rows);
+        umb_raster_map_prepare(&map, &micro.view, i % 2 != 0 ? &micro.model->bounds : NULL, rows);
         const umb_committed *committed = umb_scene_committed(scene);
         void *raster;
         umb_cull_stats stats = {0};

@@ -365,7 +365,7 @@ static void prepare_walk(walk *w, umb_culler *c, const umb_view *view)
     w->drawn = 0;
     w->stats = (umb_cull_stats){0};
     umb_frustum_prepare(&w->frustum, view);
-    umb_raster_map_prepare(&w->map, view, c->rows);
+    umb_raster_map_prepare(&w->map, view, &w->tree->bounds, c->rows);
     prepare_projector(&w->projector, &w->map);
     w->most_w = w->map.most_w < FLT_MAX ? (float)w->map.most_w : INFINITY;
 }
@@ -450,7 +450,7 @@ bool umb_culler_read_buffer(const umb_culler *c, float *pixels, size_t capacity,
     }
     const umb_view *v = &c->view;
     umb_raster_map map;
-    umb_raster_map_prepare(&map, v, c->rows);
+    umb_raster_map_prepare(&map, v, &umb_index_tree(c->index)->bounds, c->rows);
     for (uint32_t j = 0; j < b->height; ++j) {
         double y = v->y_max - (v->y_max - v->y_min) * (j + 0.5) / b->height;
         for (uint32_t i = 0; i < b->width; ++i) {

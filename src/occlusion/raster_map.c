@@ -3,10 +3,10 @@
 #define DEFAULT_WIDTH 1024
 #define DEFAULT_HEIGHT 288
 
-/* Rows: half of them within this part of the height to both sides of the horizon. */
-#define BAND 0.03
-/* How many times denser they are there, so that it is half. */
-#define DENSITY ((0.5 / (2.0 * BAND)) / (0.5 / (1.0 - 2.0 * BAND)))
+/* Rows: half of them within this part of the height to both sides of where far things lie. */
+#define BAND 0.02
+/* The band reaches lower where the eye is high above the scene, at most by this slope. */
+#define MOST_DROP 0.1
 /* The raster is levelled while every direction of the view is this far ahead of it (a cosine): beyond,
  * a levelled raster would be mostly sky. */
 #define LEAST_AHEAD 0.3
@@ -23,11 +23,11 @@ void umb_raster_map_size(const umb_view *view, uint32_t *width, uint32_t *height
 }
 
 /* A raster before it is scaled: its axes, the window of slopes (parallel: of distances) that holds the
- * frustum, and the slope of the horizon, NAN if it has none. */
+ * frustum, the slope of the horizon, NAN if it is not known, and how far below it far things lie. */
 typedef struct frame {
     umb_vec3 right, up, forward;
     double x_min, x_max, y_min, y_max;
-    double horizon;
+    double horizon, drop;
     int vertical_axis;
 } frame;
 
@@ -55,6 +55,7 @@ static frame screen_frame(const umb_view *v)
                v->y_min,
                v->y_max,
                NAN,
+               0.0,
                -1};
     return f;
 }
@@ -135,7 +136,25 @@ static bool unroll_frame(frame *f, const umb_view *v, umb_vec3 vertical)
     return find_window(f, v);
 }
 
-static frame choose_frame(const umb_view *v)
+/* How far below the horizon the scene's far end lies, as a slope: the eye's height above the lowest point over
+ * the way to the farthest. That is where most of what is far away is seen. */
+static double find_drop(const umb_view *v, umb_vec3 vertical, const umb_aabb *scene)
+{
+    double height = 0.0, reach = 0.0;
+    for (int k = 0; k < 8; ++k) {
+        umb_vec3 d = {(k & 1 ? scene->max[0] : scene->min[0]) - v->eye[0],
+                      (k & 2 ? scene->max[1] : scene->min[1]) - v->eye[1],
+                      (k & 4 ? scene->max[2] : scene->min[2]) - v->eye[2]};
+        double up = umb_vec3_dot(d, vertical);
+        double across = umb_vec3_length(umb_vec3_sub(d, umb_vec3_scale(vertical, up)));
+        height = -up > height ? -up : height;
+        reach = across > reach ? across : reach;
+    }
+    double drop = reach > 0.0 ? height / reach : 0.0;
+    return drop < MOST_DROP ? drop : MOST_DROP;
+}
+
+static frame choose_frame(const umb_view *v, const umb_aabb *scene)
 {
     const double *c = v->vertical;
     double size = fmax(fabs(c[0]), fmax(fabs(c[1]), fabs(c[2])));
@@ -144,6 +163,7 @@ static frame choose_frame(const umb_view *v)
         umb_vec3 vertical = {c[0] / size, c[1] / size, c[2] / size};
         vertical = umb_vec3_scale(vertical, 1.0 / umb_vec3_length(vertical));
         if (level_frame(&f, v, vertical) || unroll_frame(&f, v, vertical)) {
+            f.drop = scene != NULL ? find_drop(v, vertical, scene) : 0.0;
             return f;
         }
     }
@@ -165,18 +185,21 @@ static double row_edge(const umb_raster_rows *r, double row)
 
 /* The formula in float has a rounding in each of its seven operations, relative to terms whose sum is the
  * height: below 2^-21 of it. */
-static void lay_rows(umb_raster_map *map, double horizon, double *table)
+static void lay_rows(umb_raster_map *map, double horizon, double drop, double *table)
 {
     umb_raster_rows *r = &map->rows;
     double height = map->height;
-    double low = horizon - BAND * height, high = horizon + BAND * height;
+    double low = horizon - BAND * height, high = horizon + drop + BAND * height;
     low = low > 0.0 ? low : 0.0;
     high = high < height ? high : height;
     *r = (umb_raster_rows){.slope = 1.0f, .slack = (float)(0x1p-21 * height), .edge = table};
     if (high - low > 0.01 * height) { /* false for NAN */
         r->from = (float)low;
         r->span = (float)(high - low);
-        r->slope = (float)(height / (height + (DENSITY - 1.0) * r->span));
+        /* Half of the rows in a band of this width, if all of it is on the raster: the density outside is half. */
+        double whole = drop + 2.0 * BAND * height, density = (height - whole) / whole;
+        density = density > 1.0 ? density : 1.0;
+        r->slope = (float)(height / (height + (density - 1.0) * r->span));
         r->extra = (float)((height - (double)r->slope * height) / r->span);
     }
     table[0] = 0.0;
@@ -225,9 +248,9 @@ static void find_rays(umb_raster_map *map)
                     map->height * umb_vec3_sum_abs(map->ray_y);
 }
 
-void umb_raster_map_prepare(umb_raster_map *map, const umb_view *view, double *table)
+void umb_raster_map_prepare(umb_raster_map *map, const umb_view *view, const umb_aabb *scene, double *table)
 {
-    frame f = choose_frame(view);
+    frame f = choose_frame(view, scene);
     umb_raster_map_size(view, &map->width, &map->height);
     map->orthographic = view->projection == UMB_ORTHOGRAPHIC;
     map->eye = umb_vec3_from_double(view->eye);
@@ -247,5 +270,5 @@ void umb_raster_map_prepare(umb_raster_map *map, const umb_view *view, double *t
     map->scale *= 1.0 + 0x1p-18; /* axes are of unit length to within 1e-6 */
     find_rays(map);
     find_depths(map, view);
-    lay_rows(map, map->cy - f.horizon * y_scale, table);
+    lay_rows(map, map->cy - f.horizon * y_scale, f.drop * y_scale, table);
 }

@@ -67,9 +67,10 @@ static inline size_t umb_raster_map_table(uint32_t height)
 void umb_raster_map_size(const umb_view *view, uint32_t *width, uint32_t *height);
 
 /* Lay a raster over a view. It reaches a little beyond the frustum (2^-31 of its largest slope), so that
- * rounding never leaves a part of the frustum without a pixel. table: room for umb_raster_map_table(height) doubles,
+ * rounding never leaves a part of the frustum without a pixel. scene: bounds of all there is, or NULL; they say where the
+ * rows are best dense. table: room for umb_raster_map_table(height) doubles,
  * which the map points to from then on. */
-void umb_raster_map_prepare(umb_raster_map *map, const umb_view *view, double *table);
+void umb_raster_map_prepare(umb_raster_map *map, const umb_view *view, const umb_aabb *scene, double *table);
 
 /* A point on the raster. error bounds the distance to the true image in each coordinate; reach is
  * the sum of absolute components of d. */
