@@ -16,7 +16,7 @@ typedef struct scene_row {
 } scene_row;
 
 static const scene_row ROWS[] = {
-    {"blocks", "blocks-316", "gen:blocks,g=316", 0.0, true, 3600, 0, 0, 0},
+    {"blocks", "blocks-316", "gen:blocks,g=316", 0.0, true, 3200, 0, 0, 0},
     {"blocks", "blocks-100", "gen:blocks,g=100", 0.0, true, 800, 300, 0, 0},
     {"blocks", "blocks-32", "gen:blocks,g=32", 0.0, true, 800, 500, 24, 0},
     {"blocks", "blocks-32-moved", "gen:blocks,g=32", 50.0, true, 160, 300, 0, 0},
