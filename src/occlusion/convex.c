@@ -92,7 +92,7 @@ void umb_convex_of_outline(const umb_outline *o, const umb_raster_map *map, umb_
         }
     }
     /* The plane's relative 2^-22 is less than this part of its largest value over the raster. */
-    double size = fabs(o->gx) * map->width + fabs(o->gy) * map->height + fabs(o->g0);
+    double size = fabs(o->gx) * (map->width + 32.0) + fabs(o->gy) * (map->height + 8.0) + fabs(o->g0);
     umb_convex_add_plane(out, map, o->gx, o->gy, o->g0, o->g0 + 0x1p-22 * size, o->most);
     out->most = (float)(o->most + 0x1p-22 * fabs(o->most));
 }

@@ -101,7 +101,8 @@ static inline void umb_convex_add_plane(umb_convex *c, const umb_raster_map *map
                                         double low, double high, double least)
 {
     uint32_t i = c->plane_count++;
-    double size = fabs(gx) * map->width + fabs(gy) * map->height + (fabs(low) > fabs(high) ? fabs(low) : fabs(high));
+    double size = fabs(gx) * (map->width + 32.0) + fabs(gy) * (map->height + 8.0);
+    size += fabs(low) > fabs(high) ? fabs(low) : fabs(high);
     bool fits = size < 1e30;
     c->gx[i] = fits ? (float)gx : 0.0f;
     c->gy[i] = fits ? (float)gy : 0.0f;

@@ -178,19 +178,29 @@ umb_depth_place umb_image_of_part(const umb_raster_map *map, const umb_aabb *par
     return UMB_DEPTH_BEYOND;
 }
 
-/* Cut a convex polygon at one side, moved outwards by slack. Returns the number of corners left. */
+/* Cut a convex polygon at one side, moved outwards by slack. Returns the number of corners left; -1 if all are, and
+ * out is not written. */
 static int cut_polygon(const umb_raster_map *map, int side, double slack, const umb_view_point *in,
                        int count, umb_view_point *out)
 {
+    double g[3 + SIDES];
+    bool inside = true;
+    for (int i = 0; i < count; ++i) {
+        g[i] = side_value(map, side, &in[i]) + slack;
+        inside = inside && g[i] >= 0.0;
+    }
+    if (inside) {
+        return -1;
+    }
     int kept = 0;
     for (int i = 0; i < count; ++i) {
-        const umb_view_point *p = &in[i], *q = &in[(i + 1) % count];
-        double gp = side_value(map, side, p) + slack, gq = side_value(map, side, q) + slack;
-        if (gp >= 0.0) {
+        int next = i + 1 < count ? i + 1 : 0;
+        const umb_view_point *p = &in[i], *q = &in[next];
+        if (g[i] >= 0.0) {
             out[kept++] = *p;
         }
-        if ((gp >= 0.0) != (gq >= 0.0)) {
-            double t = gp / (gp - gq);
+        if ((g[i] >= 0.0) != (g[next] >= 0.0)) {
+            double t = g[i] / (g[i] - g[next]);
             umb_view_point cut = {p->x + t * (q->x - p->x), p->y + t * (q->y - p->y),
                                   p->w + t * (q->w - p->w), p->reach};
             out[kept++] = cut;
@@ -227,9 +237,12 @@ umb_depth_place umb_outline_of_triangle(const umb_raster_map *map, const float c
         if (side == 1 && isinf(map->most_w)) {
             continue;
         }
-        count = cut_polygon(map, side, side_slack(map, side, reach), polygon[now], count,
-                            polygon[1 - now]);
-        now = 1 - now;
+        int left = cut_polygon(map, side, side_slack(map, side, reach), polygon[now], count,
+                               polygon[1 - now]);
+        if (left >= 0) {
+            count = left;
+            now = 1 - now;
+        }
     }
     if (count == 0) {
         return UMB_DEPTH_OUTSIDE;

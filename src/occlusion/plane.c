@@ -44,7 +44,7 @@ bool umb_face_nearness(const umb_raster_map *map, const umb_face *f, const float
     out->gx = umb_vec3_dot(f->normal, map->ray_x) * scale;
     out->gy = umb_vec3_dot(f->normal, map->ray_y) * scale;
     out->g0 = (umb_vec3_dot(f->normal, map->ray_0) - offset) * scale;
-    double terms = fabs(out->gx) * map->width + fabs(out->gy) * map->height + fabs(out->g0);
+    double terms = fabs(out->gx) * (map->width + 32.0) + fabs(out->gy) * (map->height + 8.0) + fabs(out->g0);
     out->error = 16.0 * UMB_U * f->size * (map->ray_size + offset_size) * fabs(scale) +
                  8.0 * UMB_U * terms;
     return true;

@@ -199,26 +199,75 @@ static void list_edges(raster *r)
     }
 }
 
-/* Depth of the front: one plane if it is flat, or one bound if its image is small; else triangle by triangle. */
+/* A plane in floats, and how far it must be lowered to lie under all of the front: under its corners, since both
+ * are affine between them. A front that is cut has corners that are not kept. */
+static void store_plane(const raster *r, const umb_occluder *o, const umb_silhouette_plane *p,
+                        umb_fill_plane *out)
+{
+    const umb_silhouette *s = &r->silhouette;
+    umb_front_triangle t;
+    umb_silhouette_set_plane(&t, &r->map, p);
+    *out = (umb_fill_plane){t.gx, t.gy, t.low, t.far_corner, -INFINITY};
+    if (s->cut) {
+        return;
+    }
+    umb_silhouette_plane every = *p;
+    every.low = INFINITY;
+    for (uint32_t i = 0; i < s->front_count; ++i) {
+        double least, most;
+        umb_silhouette_offsets(s, p, o->mesh->triangles[s->front[i]], &least, &most);
+        every.low = least < every.low ? least : every.low;
+    }
+    every.low -= umb_silhouette_plane_error(s, p, s->error);
+    umb_silhouette_set_plane(&t, &r->map, &every);
+    if (t.gx == out->gx && t.gy == out->gy) {
+        out->every = t.low;
+    }
+}
+
+/* The planes of the front, a triangle at a time; false if there are too many. */
+static bool list_planes(raster *r, const umb_occluder *o)
+{
+    const umb_silhouette *s = &r->silhouette;
+    umb_mesh_fill *f = &r->fill;
+    umb_silhouette_plane planes[UMB_FILL_PLANES];
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < s->front_count; ++i) {
+        const uint32_t *corner = o->mesh->triangles[s->front[i]];
+        bool shared = false;
+        for (uint32_t k = 0; k < count && !shared; ++k) {
+            shared = umb_silhouette_shares_plane(s, &planes[k], corner);
+        }
+        if (!shared && count == UMB_FILL_PLANES) {
+            return false;
+        }
+        if (!shared) {
+            umb_silhouette_plane_of(s, &r->map, o, s->front[i], &planes[count++]);
+        }
+    }
+    for (uint32_t k = 0; k < count; ++k) {
+        store_plane(r, o, &planes[k], &f->planes[k]);
+    }
+    f->plane_count = count;
+    return true;
+}
+
+/* Depth of the front: by planes, or one bound if its image is small; else triangle by triangle. */
 static void list_depths(raster *r, const umb_occluder *o)
 {
     umb_silhouette *s = &r->silhouette;
     umb_mesh_fill *f = &r->fill;
-    umb_silhouette_plane p;
-    umb_silhouette_plane_of(s, &r->map, o, s->front[0], &p);
-    f->by_plane = !s->cut;
-    for (uint32_t i = 1; i < s->front_count && f->by_plane; ++i) {
-        f->by_plane = umb_silhouette_shares_plane(s, &p, o->mesh->triangles[s->front[i]]);
-    }
     int32_t rows = umb_raster_map_row_at(&r->map, s->y_max, 0.0) - umb_raster_map_row_at(&r->map, s->y_min, 0.0);
-    if (!f->by_plane && (s->x_max - s->x_min) * (rows + 1.0) < UMB_PLANE_PIXELS) {
-        f->by_plane = true;
-        p = (umb_silhouette_plane){0.0, 0.0, s->far_corner, s->far_corner};
-    }
-    if (f->by_plane) {
-        umb_silhouette_set_plane(&s->triangles[0], &r->map, &p);
+    if (!s->cut && (s->x_max - s->x_min) * (rows + 1.0) < UMB_PLANE_PIXELS) {
+        float least = (float)(s->far_corner - 0x1p-22 * fabs(s->far_corner));
+        f->planes[0] = (umb_fill_plane){0.0f, 0.0f, least, least, least};
+        f->plane_count = 1;
         return;
     }
+    if (list_planes(r, o)) {
+        return;
+    }
+    f->plane_count = 0;
     umb_silhouette_depths(s, &r->map, o);
     for (uint32_t i = 0; i < s->triangle_count; ++i) {
         umb_front_triangle *t = &s->triangles[i];

@@ -9,14 +9,24 @@
 #include "raster_map.h"
 #include "scene/scene.h"
 
+enum { UMB_FILL_PLANES = 8 };
+
+/* An affine function of the raster under the front: gx x + gy y + low is no more than the nearness of some of its
+ * triangles, and neither is least; with every in place of low it is no more than the nearness of any. */
+typedef struct umb_fill_plane {
+    float gx, gy, low, least, every;
+} umb_fill_plane;
+
 /* What filling a mesh works on: the tiles of its window, and for each row of tiles the lists of edges and of
- * triangles that begin there. by_plane: one triangle's plane and farthest corner hold for all of them. */
+ * triangles that begin there. Where there are planes, each triangle has one of them, and the triangles are not
+ * looked at one by one. */
 typedef struct umb_mesh_fill {
     struct umb_row_tile *tiles; /* UMB_ROW_TILE_BYTES for each column of tiles of the raster */
     uint8_t *edged;             /* all 0 */
     uint32_t *edges, *triangles; /* per row of tiles: the first of a list, or UMB_NONE */
     uint32_t tx0, tx1, ty0, ty1;
-    bool by_plane;
+    umb_fill_plane planes[UMB_FILL_PLANES];
+    uint32_t plane_count;
 } umb_mesh_fill;
 
 #define UMB_ROW_TILE_BYTES 256
@@ -38,7 +48,7 @@ typedef struct umb_raster_kernels {
     /* True if all of the body is hidden, as far as it lies in rect; find_convex made it. */
     bool (*hides_convex)(const umb_coverage *c, const umb_raster_map *map, const umb_convex *convex,
                          umb_pixel_rect rect);
-    /* Add what any occluder covers: its outline and, unless fill->by_plane, its depth triangles are found. True if
+    /* Add what any occluder covers: its outline and, unless there are planes, its depth triangles are found. True if
        the buffer changed. */
     bool (*fill_mesh)(umb_coverage *c, const umb_raster_map *map, umb_silhouette *s, umb_mesh_fill *fill);
 } umb_raster_kernels;

@@ -564,6 +564,7 @@ typedef struct row_window {
     struct umb_row_tile *tiles; /* from the first column of the raster on */
     uint8_t *edged;             /* tiles that an edge has written to */
     uint32_t tx0, tx1;
+    uint32_t first, last; /* of those tiles, and on to the right as far as pixels are covered */
 } row_window;
 
 /* Pixels touched by an edge in eight rows, and the column from which on it counts; both as columns from first on,
@@ -652,7 +653,7 @@ static inline void clear_tile(struct umb_row_tile *t)
     }
 }
 
-static __attribute__((noinline)) void draw_edge(const row_window *w, const umb_outline_edge *e, const double *edge)
+static inline void draw_edge(row_window *w, const umb_outline_edge *e, const double *edge)
 {
     double first = w->tx0 * (double)UMB_TILE_WIDTH, end = (w->tx1 + 1.0) * UMB_TILE_WIDTH;
     double low, high;
@@ -669,6 +670,8 @@ static __attribute__((noinline)) void draw_edge(const row_window *w, const umb_o
         s[i] = span_edge(e, edge, i, first, end);
     }
     int32_t times = e->count < 0 ? -e->count : e->count;
+    w->first = t0 < w->first ? t0 : w->first;
+    w->last = t1 > w->last ? t1 : w->last;
     for (uint32_t tx = t0; tx <= t1; ++tx) {
         struct umb_row_tile *t = &w->tiles[tx];
         int32_t x = (int32_t)(tx * UMB_TILE_WIDTH);
@@ -691,14 +694,24 @@ static __attribute__((noinline)) void draw_edge(const row_window *w, const umb_o
 /* What is covered in a row of tiles, left to right; the winding number at a tile's last column goes on into the
  * next. Tiles without edges are all alike. True if some sub-tile is wanted: the occluder covers open pixels there,
  * or closed ones perhaps from nearer. */
-static __attribute__((noinline)) bool sweep(const umb_coverage *c, const row_window *w, size_t row, float most)
+static inline bool sweep(const umb_coverage *c, row_window *w, size_t row, float most)
 {
     umb_iv zero = umb_iv_set(0), wanted = zero;
     umb_iv one[UMB_PARTS], two[UMB_PARTS], four[UMB_PARTS], inside[UMB_PARTS];
     for (int i = 0; i < UMB_PARTS; ++i) {
         one[i] = two[i] = four[i] = inside[i] = zero;
     }
-    for (uint32_t tx = w->tx0; tx <= w->tx1; ++tx) {
+    for (uint32_t tx = w->first; tx <= w->tx1; ++tx) {
+        if (tx > w->last) { /* edges beyond the raster's right border are left out */
+            umb_iv on = inside[0];
+            for (int i = 1; i < UMB_PARTS; ++i) {
+                on |= inside[i];
+            }
+            if (!umb_iv_any(on)) {
+                break;
+            }
+            w->last = w->tx1;
+        }
         struct umb_row_tile *t = &w->tiles[tx];
         const umb_tile *tile = &c->tiles[row + tx];
         bool edged = w->edged[tx] != 0;
@@ -735,7 +748,7 @@ static __attribute__((noinline)) bool sweep(const umb_coverage *c, const row_win
 
 /* Depth where the triangles' own images decide: all that touch a sub-tile bound it together, from the farthest;
  * one that holds all of it does so alone, however far the others are. */
-static __attribute__((noinline)) void lower_row(const row_window *w, const umb_front_triangle *f, const double *edge)
+static inline void lower_row(const row_window *w, const umb_front_triangle *f, const double *edge)
 {
     const float y[3] = {(float)edge[0], (float)edge[4], (float)edge[8]};
     umb_fv most[3][UMB_PARTS], least[3][UMB_PARTS], plane[UMB_PARTS];
@@ -753,7 +766,7 @@ static __attribute__((noinline)) void lower_row(const row_window *w, const umb_f
         plane[i] = (f->low + f->gy * umb_fv_fours(end[0], end[1], i)) +
                    f->gx * (column + (f->gx < 0.0f ? 8.0f : 0.0f));
     }
-    uint32_t t0 = f->tx0 > w->tx0 ? f->tx0 : w->tx0, t1 = f->tx1 < w->tx1 ? f->tx1 : w->tx1;
+    uint32_t t0 = f->tx0 > w->first ? f->tx0 : w->first, t1 = f->tx1 < w->last ? f->tx1 : w->last;
     for (uint32_t tx = t0; tx <= t1; ++tx) {
         struct umb_row_tile *t = &w->tiles[tx];
         float x = (float)(tx * UMB_TILE_WIDTH);
@@ -776,25 +789,42 @@ static __attribute__((noinline)) void lower_row(const row_window *w, const umb_f
     }
 }
 
-/* Depth where one plane holds for all triangles. */
-static __attribute__((noinline)) void lower_row_by_plane(const row_window *w, const umb_front_triangle *f, const double *edge)
+/* Depth by planes. A covered point lies on some triangle, which is no farther than its own plane: the least of all
+ * planes is a bound, a tight one where the front bulges towards the eye. And each plane that is nowhere above the
+ * front is a bound by itself: the greatest of them is tight in a corner that is looked into. */
+static inline void lower_row_by_planes(const row_window *w, const umb_mesh_fill *f, const double *edge)
 {
     const float y[3] = {(float)edge[0], (float)edge[4], (float)edge[8]};
-    const float *end = f->gy < 0.0f ? y + 1 : y;
     for (int i = 0; i < UMB_PARTS; ++i) {
-        umb_fv column = umb_fv_load(SUB_X + i * UMB_LANES) + (f->gx < 0.0f ? 8.0f : 0.0f);
-        umb_fv plane = (f->low + f->gy * umb_fv_fours(end[0], end[1], i)) + f->gx * column;
-        for (uint32_t tx = w->tx0; tx <= w->tx1; ++tx) {
+        umb_fv at[UMB_FILL_PLANES];
+        for (uint32_t k = 0; k < f->plane_count; ++k) {
+            const umb_fill_plane *p = &f->planes[k];
+            const float *end = p->gy < 0.0f ? y + 1 : y;
+            umb_fv column = umb_fv_load(SUB_X + i * UMB_LANES) + (p->gx < 0.0f ? 8.0f : 0.0f);
+            at[k] = p->gy * umb_fv_fours(end[0], end[1], i) + p->gx * column;
+        }
+        for (uint32_t tx = w->first; tx <= w->last; ++tx) {
+            struct umb_row_tile *t = &w->tiles[tx];
+            if (!umb_iv_any(t->wanted[i])) {
+                continue;
+            }
             float x = (float)(tx * UMB_TILE_WIDTH);
-            w->tiles[tx].z[i] = umb_fv_max(plane + f->gx * x, umb_fv_set(f->far_corner));
+            umb_fv some = umb_fv_set(INFINITY), every = -some;
+            for (uint32_t k = 0; k < f->plane_count; ++k) {
+                const umb_fill_plane *p = &f->planes[k];
+                umb_fv v = at[k] + p->gx * x;
+                some = umb_fv_min(some, umb_fv_max(v + p->low, umb_fv_set(p->least)));
+                every = umb_fv_max(every, v + p->every);
+            }
+            t->z[i] = umb_fv_max(some, every);
         }
     }
 }
 
-static __attribute__((noinline)) bool merge_row(umb_coverage *c, const row_window *w, size_t row, bool held)
+static inline bool merge_row(umb_coverage *c, const row_window *w, size_t row, bool held)
 {
     bool changed = false;
-    for (uint32_t tx = w->tx0; tx <= w->tx1; ++tx) {
+    for (uint32_t tx = w->first; tx <= w->last; ++tx) {
         struct umb_row_tile *t = &w->tiles[tx];
         tile_part parts[UMB_PARTS];
         umb_iv any = umb_iv_set(0);
@@ -812,14 +842,16 @@ static __attribute__((noinline)) bool merge_row(umb_coverage *c, const row_windo
 
 static bool fill_mesh(umb_coverage *c, const umb_raster_map *map, umb_silhouette *s, umb_mesh_fill *fill)
 {
-    row_window w = {fill->tiles, fill->edged, fill->tx0, fill->tx1};
+    row_window w = {fill->tiles, fill->edged, fill->tx0, fill->tx1, 0, 0};
     umb_fv far = umb_fv_set(INFINITY);
     float most = (float)(s->most + 0x1p-22 * fabs(s->most));
     uint32_t edges = UMB_NONE, triangles = UMB_NONE; /* those that this row of tiles meets */
-    bool changed = false, by_plane = fill->by_plane;
+    bool changed = false, by_plane = fill->plane_count > 0;
     for (uint32_t ty = fill->ty0; ty <= fill->ty1; ++ty) {
         const double *edge = map->rows.edge + (size_t)ty * UMB_TILE_HEIGHT;
         size_t row = (size_t)ty * c->columns;
+        w.first = w.tx1 + 1;
+        w.last = w.tx0;
         /* The lists of this row join what is still there of those before. */
         for (uint32_t i = fill->edges[ty], next; i != UMB_NONE; i = next) {
             next = s->edges[i].next;
@@ -842,7 +874,7 @@ static bool fill_mesh(umb_coverage *c, const umb_raster_map *map, umb_silhouette
                 s->triangles[i].next = triangles;
                 triangles = i;
             }
-            for (uint32_t tx = w.tx0; tx <= w.tx1 && wanted; ++tx) {
+            for (uint32_t tx = w.first; tx <= w.last && wanted; ++tx) {
                 for (int i = 0; i < UMB_PARTS; ++i) {
                     w.tiles[tx].z[i] = far;
                     w.tiles[tx].held[i] = -far;
@@ -860,7 +892,7 @@ static bool fill_mesh(umb_coverage *c, const umb_raster_map *map, umb_silhouette
                 }
             }
         } else if (wanted) {
-            lower_row_by_plane(&w, &s->triangles[0], edge);
+            lower_row_by_planes(&w, fill, edge);
         }
         if (wanted) {
             changed |= merge_row(c, &w, row, !by_plane);

@@ -268,7 +268,7 @@ void umb_silhouette_plane_of(const umb_silhouette *s, const umb_raster_map *map,
         p->gx = g.gx;
         p->gy = g.gy;
         /* Its relative 2^-22 is less than this part of its largest value over the raster. */
-        double size = fabs(g.gx) * map->width + fabs(g.gy) * map->height + fabs(g.g0);
+        double size = fabs(g.gx) * (map->width + 32.0) + fabs(g.gy) * (map->height + 8.0) + fabs(g.g0);
         p->low = g.g0 - g.error - 0x1p-22 * size;
         return;
     }
@@ -284,6 +284,9 @@ void umb_silhouette_plane_of(const umb_silhouette *s, const umb_raster_map *map,
 
 bool umb_silhouette_shares_plane(const umb_silhouette *s, umb_silhouette_plane *p, const uint32_t corner[3])
 {
+    if (s->cut && !(kept(s, corner[0]) && kept(s, corner[1]) && kept(s, corner[2]))) {
+        return false;
+    }
     double least, most, alike = 0x1p-12 * fabs(p->far_corner);
     umb_silhouette_offsets(s, p, corner, &least, &most);
     if (!(fabs(least - p->low) < alike && fabs(most - p->low) < alike)) {
@@ -305,7 +308,7 @@ static void find_sides(umb_front_triangle *t, const umb_silhouette *s, const umb
     double area = (s->x[k[1]] - s->x[k[0]]) * (s->y[k[2]] - s->y[k[0]]) -
                   (s->y[k[1]] - s->y[k[0]]) * (s->x[k[2]] - s->x[k[0]]);
     double turn = area < 0.0 ? -1.0 : 1.0;
-    double raster = (double)map->width + map->height, error = corner_error(s, k);
+    double raster = map->width + 32.0 + map->height + 8.0, error = corner_error(s, k);
     t->sided = true;
     for (int i = 0; i < 3; ++i) {
         uint32_t a = k[i], b = k[(i + 1) % 3];
@@ -350,7 +353,7 @@ static uint32_t find_tiles(umb_front_triangle *t, const umb_silhouette *s, const
 
 void umb_silhouette_set_plane(umb_front_triangle *t, const umb_raster_map *map, const umb_silhouette_plane *p)
 {
-    double size = fabs(p->gx) * map->width + fabs(p->gy) * map->height + fabs(p->low);
+    double size = fabs(p->gx) * (map->width + 32.0) + fabs(p->gy) * (map->height + 8.0) + fabs(p->low);
     bool fits = size < 1e30;
     t->far_corner = (float)(p->far_corner - 0x1p-22 * fabs(p->far_corner));
     t->gx = fits ? (float)p->gx : 0.0f;

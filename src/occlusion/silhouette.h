@@ -91,7 +91,7 @@ double umb_silhouette_plane_error(const umb_silhouette *s, const umb_silhouette_
  * triangle's image, so that holds between corners too. Cut triangles: from the world. */
 void umb_silhouette_plane_of(const umb_silhouette *s, const umb_raster_map *map, const umb_occluder *o,
                              uint32_t triangle, umb_silhouette_plane *out);
-/* True if a triangle that is not cut lies in a plane as good as exactly: the plane is then lowered by what the
+/* True if a triangle is not cut and lies in a plane as good as exactly: the plane is then lowered by what the
  * triangle needs. */
 bool umb_silhouette_shares_plane(const umb_silhouette *s, umb_silhouette_plane *p, const uint32_t corner[3]);
 
