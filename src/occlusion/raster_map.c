@@ -7,6 +7,8 @@
 #define BAND 0.02
 /* The band reaches lower where the eye is high above the scene, at most by this slope. */
 #define MOST_DROP 0.1
+/* A scene is tall when its height is more than this part of its diagonal. */
+#define MOST_TALL 0.4
 /* The raster is levelled while every direction of the view is this far ahead of it (a cosine): beyond,
  * a levelled raster would be mostly sky. */
 #define LEAST_AHEAD 0.3
@@ -137,10 +139,11 @@ static bool unroll_frame(frame *f, const umb_view *v, umb_vec3 vertical)
 }
 
 /* How far below the horizon the scene's far end lies, as a slope: the eye's height above the lowest point over
- * the way to the farthest. That is where most of what is far away is seen. */
+ * the way to the farthest. That is where most of what is far away is seen. NAN if the scene is as tall as wide:
+ * what is far away is then seen everywhere. */
 static double find_drop(const umb_view *v, umb_vec3 vertical, const umb_aabb *scene)
 {
-    double height = 0.0, reach = 0.0;
+    double height = 0.0, reach = 0.0, low = INFINITY, high = -INFINITY;
     for (int k = 0; k < 8; ++k) {
         umb_vec3 d = {(k & 1 ? scene->max[0] : scene->min[0]) - v->eye[0],
                       (k & 2 ? scene->max[1] : scene->min[1]) - v->eye[1],
@@ -148,7 +151,14 @@ static double find_drop(const umb_view *v, umb_vec3 vertical, const umb_aabb *sc
         double up = umb_vec3_dot(d, vertical);
         double across = umb_vec3_length(umb_vec3_sub(d, umb_vec3_scale(vertical, up)));
         height = -up > height ? -up : height;
+        low = up < low ? up : low;
+        high = up > high ? up : high;
         reach = across > reach ? across : reach;
+    }
+    umb_vec3 size = {(double)scene->max[0] - scene->min[0], (double)scene->max[1] - scene->min[1],
+                     (double)scene->max[2] - scene->min[2]};
+    if (high - low > MOST_TALL * umb_vec3_length(size)) {
+        return NAN;
     }
     double drop = reach > 0.0 ? height / reach : 0.0;
     return drop < MOST_DROP ? drop : MOST_DROP;
