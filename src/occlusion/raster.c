@@ -21,7 +21,7 @@ typedef struct raster {
     umb_convex convex; /* of the occluder convex_of, UMB_NONE: of none */
     umb_convex_result convex_found;
     uint32_t convex_of;
-    size_t tile_capacity, edged_capacity, edge_capacity, triangle_capacity;
+    size_t tile_capacity, state_capacity, list_capacity, edge_capacity, triangle_capacity;
 } raster;
 
 static umb_result create(const umb_allocator *allocator, umb_isa isa, void **state)
@@ -43,7 +43,8 @@ static void destroy(void *state)
     umb_coverage_free(&r->coverage, &a);
     umb_silhouette_free(&r->silhouette, &a);
     umb_memory_free(&a, r->fill.tiles, r->tile_capacity * UMB_ROW_TILE_BYTES);
-    umb_memory_free(&a, r->fill.edged, r->edged_capacity);
+    umb_memory_free(&a, r->fill.state, r->state_capacity);
+    umb_memory_free(&a, r->fill.list, r->list_capacity * sizeof *r->fill.list);
     umb_memory_free(&a, r->fill.edges, r->edge_capacity * sizeof *r->fill.edges);
     umb_memory_free(&a, r->fill.triangles, r->triangle_capacity * sizeof *r->fill.triangles);
     umb_memory_free(&a, r, sizeof *r);
@@ -55,12 +56,13 @@ static bool reserve_fill(raster *r)
     size_t columns = r->coverage.columns, rows = r->coverage.rows;
     umb_mesh_fill *f = &r->fill;
     if (!umb_memory_reserve(a, (void **)&f->tiles, &r->tile_capacity, columns, UMB_ROW_TILE_BYTES) ||
-        !umb_memory_reserve(a, (void **)&f->edged, &r->edged_capacity, columns, 1) ||
+        !umb_memory_reserve(a, (void **)&f->state, &r->state_capacity, columns, 1) ||
+        !umb_memory_reserve(a, (void **)&f->list, &r->list_capacity, columns, sizeof *f->list) ||
         !umb_memory_reserve(a, (void **)&f->edges, &r->edge_capacity, rows, sizeof *f->edges) ||
         !umb_memory_reserve(a, (void **)&f->triangles, &r->triangle_capacity, rows, sizeof *f->triangles)) {
         return false;
     }
-    memset(f->edged, 0, columns);
+    memset(f->state, 0, columns);
     return true;
 }
 

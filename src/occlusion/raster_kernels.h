@@ -22,7 +22,8 @@ typedef struct umb_fill_plane {
  * looked at one by one. */
 typedef struct umb_mesh_fill {
     struct umb_row_tile *tiles; /* UMB_ROW_TILE_BYTES for each column of tiles of the raster */
-    uint8_t *edged;             /* all 0 */
+    uint8_t *state;             /* per column of tiles, all 0 */
+    uint16_t *list;             /* room for a row of tiles */
     uint32_t *edges, *triangles; /* per row of tiles: the first of a list, or UMB_NONE */
     uint32_t tx0, tx1, ty0, ty1;
     umb_fill_plane planes[UMB_FILL_PLANES];

@@ -562,10 +562,14 @@ struct umb_row_tile {
 
 typedef struct row_window {
     struct umb_row_tile *tiles; /* from the first column of the raster on */
-    uint8_t *edged;             /* tiles that an edge has written to */
+    uint8_t *state; /* per tile */
+    uint16_t *list; /* tiles of which something is wanted, left to right */
+    uint32_t count; /* of list */
     uint32_t tx0, tx1;
-    uint32_t first, last; /* of those tiles, and on to the right as far as pixels are covered */
+    uint32_t first, last; /* tiles that an edge has written to lie between these */
 } row_window;
+
+enum { TILE_IDLE = 0, TILE_EDGED = 1, TILE_WANTED = 2 };
 
 /* Pixels touched by an edge in eight rows, and the column from which on it counts; both as columns from first on,
  * cut to the window [first, end). */
@@ -675,8 +679,8 @@ static inline void draw_edge(row_window *w, const umb_outline_edge *e, const dou
     for (uint32_t tx = t0; tx <= t1; ++tx) {
         struct umb_row_tile *t = &w->tiles[tx];
         int32_t x = (int32_t)(tx * UMB_TILE_WIDTH);
-        if (w->edged[tx] == 0) {
-            w->edged[tx] = 1;
+        if (w->state[tx] == TILE_IDLE) {
+            w->state[tx] = TILE_EDGED;
             clear_tile(t);
         }
         for (int i = 0; i < UMB_PARTS; ++i) {
@@ -692,31 +696,27 @@ static inline void draw_edge(row_window *w, const umb_outline_edge *e, const dou
 }
 
 /* What is covered in a row of tiles, left to right; the winding number at a tile's last column goes on into the
- * next. Tiles without edges are all alike. True if some sub-tile is wanted: the occluder covers open pixels there,
- * or closed ones perhaps from nearer. */
-static inline bool sweep(const umb_coverage *c, row_window *w, size_t row, float most)
+ * next. Tiles without edges are all alike. A tile is wanted if the occluder covers open pixels there, or closed ones
+ * perhaps from nearer. */
+static inline void sweep(const umb_coverage *c, row_window *w, size_t row, float most)
 {
-    umb_iv zero = umb_iv_set(0), wanted = zero;
+    umb_iv zero = umb_iv_set(0);
     umb_iv one[UMB_PARTS], two[UMB_PARTS], four[UMB_PARTS], inside[UMB_PARTS];
+    bool covers = false; /* a tile without edges here would be covered somewhere */
     for (int i = 0; i < UMB_PARTS; ++i) {
         one[i] = two[i] = four[i] = inside[i] = zero;
     }
-    for (uint32_t tx = w->first; tx <= w->tx1; ++tx) {
-        if (tx > w->last) { /* edges beyond the raster's right border are left out */
-            umb_iv on = inside[0];
-            for (int i = 1; i < UMB_PARTS; ++i) {
-                on |= inside[i];
-            }
-            if (!umb_iv_any(on)) {
-                break;
-            }
-            w->last = w->tx1;
-        }
+    w->count = 0;
+    for (uint32_t tx = w->first; tx <= w->tx1 && (covers || tx <= w->last); ++tx) {
         struct umb_row_tile *t = &w->tiles[tx];
-        const umb_tile *tile = &c->tiles[row + tx];
-        bool edged = w->edged[tx] != 0;
+        bool edged = w->state[tx] == TILE_EDGED;
         bool closed = c->coarse[row + tx] >= most;
-        w->edged[tx] = 0;
+        if (!edged && (closed || !covers)) {
+            continue;
+        }
+        const umb_tile *tile = &c->tiles[row + tx];
+        umb_iv wanted = zero, on = zero;
+        w->state[tx] = TILE_IDLE;
         for (int i = 0; i < UMB_PARTS; ++i) {
             umb_iv mask = inside[i];
             if (edged) {
@@ -730,20 +730,27 @@ static inline bool sweep(const umb_coverage *c, row_window *w, size_t row, float
                 two[i] = b >> 31;
                 four[i] = d >> 31;
                 inside[i] = one[i] | two[i] | four[i];
+                on |= inside[i];
             }
             int at = i * UMB_LANES;
             umb_iv byte = umb_iv_load(SUB_BYTE + at);
             umb_iv fresh = (umb_iv_or_fours(mask & ~umb_iv_load(tile->mask + at)) & byte) != 0;
             umb_iv nearer = umb_fv_load(tile->z + at) < most;
             umb_iv some = (umb_iv_or_fours(mask) & byte) != 0;
-            umb_iv want = closed ? zero : fresh | (some & nearer);
+            umb_iv want = fresh | (some & nearer);
             t->wanted[i] = want;
             /* Pixels of sub-tiles that nothing is wanted of are dropped. */
             t->mask[i] = mask & umb_iv_spread(want);
             wanted |= want;
         }
+        if (edged) {
+            covers = umb_iv_any(on);
+        }
+        if (!closed && umb_iv_any(wanted)) {
+            w->state[tx] = TILE_WANTED;
+            w->list[w->count++] = (uint16_t)tx;
+        }
     }
-    return umb_iv_any(wanted);
 }
 
 /* Depth where the triangles' own images decide: all that touch a sub-tile bound it together, from the farthest;
@@ -766,15 +773,13 @@ static inline void lower_row(const row_window *w, const umb_front_triangle *f, c
         plane[i] = (f->low + f->gy * umb_fv_fours(end[0], end[1], i)) +
                    f->gx * (column + (f->gx < 0.0f ? 8.0f : 0.0f));
     }
-    uint32_t t0 = f->tx0 > w->first ? f->tx0 : w->first, t1 = f->tx1 < w->last ? f->tx1 : w->last;
+    uint32_t t0 = f->tx0 > w->list[0] ? f->tx0 : w->list[0];
+    uint32_t t1 = f->tx1 < w->list[w->count - 1] ? f->tx1 : w->list[w->count - 1];
     for (uint32_t tx = t0; tx <= t1; ++tx) {
         struct umb_row_tile *t = &w->tiles[tx];
         float x = (float)(tx * UMB_TILE_WIDTH);
-        for (int i = 0; i < UMB_PARTS; ++i) {
+        for (int i = 0; i < UMB_PARTS && w->state[tx] == TILE_WANTED; ++i) {
             umb_iv touches = t->wanted[i], holds = umb_iv_set(0);
-            if (!umb_iv_any(touches)) {
-                continue;
-            }
             if (f->sided) {
                 holds = touches;
                 for (int k = 0; k < 3; ++k) {
@@ -803,12 +808,9 @@ static inline void lower_row_by_planes(const row_window *w, const umb_mesh_fill 
             umb_fv column = umb_fv_load(SUB_X + i * UMB_LANES) + (p->gx < 0.0f ? 8.0f : 0.0f);
             at[k] = p->gy * umb_fv_fours(end[0], end[1], i) + p->gx * column;
         }
-        for (uint32_t tx = w->first; tx <= w->last; ++tx) {
-            struct umb_row_tile *t = &w->tiles[tx];
-            if (!umb_iv_any(t->wanted[i])) {
-                continue;
-            }
-            float x = (float)(tx * UMB_TILE_WIDTH);
+        for (uint32_t n = 0; n < w->count; ++n) {
+            struct umb_row_tile *t = &w->tiles[w->list[n]];
+            float x = (float)(w->list[n] * UMB_TILE_WIDTH);
             umb_fv some = umb_fv_set(INFINITY), every = -some;
             for (uint32_t k = 0; k < f->plane_count; ++k) {
                 const umb_fill_plane *p = &f->planes[k];
@@ -821,28 +823,26 @@ static inline void lower_row_by_planes(const row_window *w, const umb_mesh_fill 
     }
 }
 
-static inline bool merge_row(umb_coverage *c, const row_window *w, size_t row, bool held)
+static inline bool merge_row(umb_coverage *c, row_window *w, size_t row, bool held)
 {
     bool changed = false;
-    for (uint32_t tx = w->first; tx <= w->last; ++tx) {
+    for (uint32_t n = 0; n < w->count; ++n) {
+        uint32_t tx = w->list[n];
         struct umb_row_tile *t = &w->tiles[tx];
         tile_part parts[UMB_PARTS];
-        umb_iv any = umb_iv_set(0);
+        w->state[tx] = TILE_IDLE;
         for (int i = 0; i < UMB_PARTS; ++i) {
             parts[i].mask = t->mask[i];
             parts[i].z = held ? umb_fv_max(t->z[i], t->held[i]) : t->z[i];
-            any |= t->mask[i];
         }
-        if (umb_iv_any(any)) {
-            changed |= merge_parts(c, row + tx, parts);
-        }
+        changed |= merge_parts(c, row + tx, parts);
     }
     return changed;
 }
 
 static bool fill_mesh(umb_coverage *c, const umb_raster_map *map, umb_silhouette *s, umb_mesh_fill *fill)
 {
-    row_window w = {fill->tiles, fill->edged, fill->tx0, fill->tx1, 0, 0};
+    row_window w = {fill->tiles, fill->state, fill->list, 0, fill->tx0, fill->tx1, 0, 0};
     umb_fv far = umb_fv_set(INFINITY);
     float most = (float)(s->most + 0x1p-22 * fabs(s->most));
     uint32_t edges = UMB_NONE, triangles = UMB_NONE; /* those that this row of tiles meets */
@@ -867,17 +867,18 @@ static bool fill_mesh(umb_coverage *c, const umb_raster_map *map, umb_silhouette
                 at = &e->next;
             }
         }
-        bool wanted = sweep(c, &w, row, most);
+        sweep(c, &w, row, most);
+        bool wanted = w.count > 0;
         if (!by_plane) {
             for (uint32_t i = fill->triangles[ty], next; i != UMB_NONE; i = next) {
                 next = s->triangles[i].next;
                 s->triangles[i].next = triangles;
                 triangles = i;
             }
-            for (uint32_t tx = w.first; tx <= w.last && wanted; ++tx) {
+            for (uint32_t n = 0; n < w.count; ++n) {
                 for (int i = 0; i < UMB_PARTS; ++i) {
-                    w.tiles[tx].z[i] = far;
-                    w.tiles[tx].held[i] = -far;
+                    w.tiles[w.list[n]].z[i] = far;
+                    w.tiles[w.list[n]].held[i] = -far;
                 }
             }
             for (uint32_t *at = &triangles; *at != UMB_NONE;) {
