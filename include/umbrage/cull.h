@@ -24,10 +24,41 @@ typedef enum umb_class {
     UMB_CLASS_APPROXIMATE = 2 /* the user asked for an error: contribution culling */
 } umb_class;
 
+/* What a culler may carry over from one frame to the next (Gummerus 3.7, 5.2), as bits. Each is safe alone and with
+ * any others: an occluder may be drawn at any time, a node opened or an object reported without asking, and
+ * nothing is ever hidden but by a test of this frame. They pay, if at all, for one viewer that moves in small steps.
+ * What is remembered is dropped when objects or occluders come or go. */
+typedef enum umb_coherence {
+    /* What changed the buffer in the last frame is drawn first, nearest first, before anything is asked (Greene's
+       temporal coherence list). */
+    UMB_COHERENCE_LIST = 1u << 0,
+    /* Nodes that had something visible below them in the last frame are opened untested: tests begin where they
+       ended (hierarchical updating). */
+    UMB_COHERENCE_HIERARCHY = 1u << 1,
+    /* A box that lies, in the picture and in depth, within one just found hidden is hidden without a test
+       (visibility propagation, in the form that proves it). */
+    UMB_COHERENCE_PROPAGATION = 1u << 2,
+    /* What was visible in the last frame is reported untested, except in one frame of four, each object in its own
+       (conservative hierarchical updating). May report more, for three frames. */
+    UMB_COHERENCE_CONSERVATIVE = 1u << 3,
+    /* An occluder that covered nothing new when it was last drawn rests for 1, 2, 4, then 8 frames, as long as its
+       image stays much where and what it was; convex ones, which are cheap, do not. May report more. */
+    UMB_COHERENCE_REST = 1u << 4,
+    UMB_COHERENCE_ALL = (1u << 5) - 1
+} umb_coherence;
+
 typedef struct umb_culler_def {
     umb_method method;
     umb_isa isa;       /* AUTO by default; answers do not depend on it */
     umb_error *error;  /* text of failures; may be NULL; must outlive the culler */
+    /* UMB_COHERENCE_... bits. 0: none, an answer depends on the scene and the view alone. With any, and with a
+       budget, it depends on the views before, too, and on nothing else: the same frames give the same answers.
+       A capture (capture.h) holds such an answer, and its replay begins without a past. */
+    uint32_t coherence;
+    /* Draw at most so many occluders in a frame, those with the best score: the area of the image of their box,
+       times how often their drawing changed anything of late. What score it takes is learned from frame to frame;
+       the first frame draws the nearest. 0: no limit. */
+    uint32_t occluder_budget;
 } umb_culler_def;
 
 typedef struct umb_cull_stats {
@@ -41,6 +72,11 @@ typedef struct umb_cull_stats {
     uint32_t occluders;    /* occluders drawn */
     uint32_t edges;        /* silhouette edges drawn */
     uint32_t small;        /* objects dropped by the contribution threshold */
+    uint32_t idle;         /* occluders not drawn because it would have changed little or nothing */
+    uint32_t early;        /* of the occluders drawn: by UMB_COHERENCE_LIST, before the walk */
+    uint32_t saved;        /* boxes not tested for occlusion, thanks to what was remembered */
+    uint32_t resting;      /* occluders not drawn by UMB_COHERENCE_REST */
+    uint32_t over_budget;  /* occluders not drawn by the budget */
 } umb_cull_stats;
 
 /* The answer. Borrowed: valid until the culler's next call. */

@@ -26,8 +26,14 @@
 #include "index/tree.h"
 #include "occlusion/image.h"
 #include "occlusion/method.h"
+#include "past.h"
 
+/* Images of boxes whose shorter side, in pixels beyond the first, is less than this cover nothing worth having: a
+ * silhouette of two pixels across covers one at most, and one with more edges than a box less. */
 #define LEAST_PIXELS 2
+#define LEAST_MESH_PIXELS 4
+/* Where it is less than this, a sub-tile is hardly ever covered by one occluder alone. */
+#define DEPTH_PIXELS 16
 
 struct umb_culler {
     umb_allocator allocator;
@@ -43,6 +49,7 @@ struct umb_culler {
     double *rows;    /* the raster's table of rows */
     uint8_t *planes; /* per node: the plane that all its boxes failed last time (plane coherency) */
     size_t found_capacity, object_capacity, inside_capacity, plane_capacity, row_capacity;
+    umb_past past;
     uint32_t count;
     bool answered;
     umb_view view;    /* of the last answer */
@@ -76,6 +83,10 @@ umb_result umb_culler_create(const umb_index *index, const umb_culler_def *def, 
     if (def->method != UMB_METHOD_RASTER && def->method != UMB_METHOD_NONE) {
         return umb_error_set(def->error, UMB_ERROR_ARGUMENT, "unknown method %d", (int)def->method);
     }
+    if ((def->coherence & ~(uint32_t)UMB_COHERENCE_ALL) != 0) {
+        return umb_error_set(def->error, UMB_ERROR_ARGUMENT, "unknown coherence switches 0x%x",
+                             def->coherence & ~(uint32_t)UMB_COHERENCE_ALL);
+    }
     const umb_allocator *allocator = umb_scene_allocator(umb_index_scene(index));
     umb_culler *c = umb_memory_allocate_zero(allocator, 1, sizeof *c);
     if (c == NULL) {
@@ -86,6 +97,10 @@ umb_result umb_culler_create(const umb_index *index, const umb_culler_def *def, 
     c->def = *def;
     c->kernels = kernels;
     c->ops = umb_method_get(def->method);
+    if (c->ops != NULL) { /* without occlusion there is nothing to learn */
+        c->past.switches = def->coherence;
+        c->past.budget = def->occluder_budget;
+    }
     if (c->ops != NULL && c->ops->create(allocator, def->isa, &c->method) != UMB_OK) {
         umb_memory_free(allocator, c, sizeof *c);
         return umb_error_set(def->error, UMB_ERROR_MEMORY, "no memory for a culler");
@@ -104,6 +119,7 @@ void umb_culler_destroy(umb_culler *c)
         c->ops->destroy(c->method);
     }
     umb_heap_free(&c->heap, &a);
+    umb_past_free(&c->past, &a);
     umb_memory_free(&a, c->found, c->found_capacity * sizeof *c->found);
     umb_memory_free(&a, c->objects, c->object_capacity * sizeof *c->objects);
     umb_memory_free(&a, c->inside, c->inside_capacity);
@@ -113,16 +129,17 @@ void umb_culler_destroy(umb_culler *c)
 }
 
 /* Everything that a walk can need, so that it never allocates: each item and node waits at most
- * once. */
+ * once, and occluders drawn early are gone before the walk begins. */
 static bool reserve(umb_culler *c, const umb_view *view, const umb_tree *tree, const umb_committed *scene)
 {
     const umb_allocator *a = &c->allocator;
     size_t planes = c->plane_capacity;
     uint32_t width, height;
     umb_raster_map_size(view, &width, &height);
+    size_t waiting = (size_t)tree->item_count + tree->node_count, early = scene->occluder_count;
     if (!umb_memory_reserve(a, (void **)&c->rows, &c->row_capacity, umb_raster_map_table(height),
                             sizeof *c->rows) ||
-        !umb_heap_reserve(&c->heap, a, (size_t)tree->item_count + tree->node_count) ||
+        !umb_heap_reserve(&c->heap, a, waiting > early ? waiting : early) ||
         !umb_memory_reserve(a, (void **)&c->found, &c->found_capacity, scene->object_count,
                             sizeof *c->found) ||
         !umb_memory_reserve(a, (void **)&c->objects, &c->object_capacity, scene->object_count,
@@ -139,8 +156,18 @@ static bool reserve(umb_culler *c, const umb_view *view, const umb_tree *tree, c
 
 static bool hidden(walk *w, const umb_image *image)
 {
+    umb_past *past = &w->culler->past;
+    bool propagates = umb_past_has(past, UMB_COHERENCE_PROPAGATION);
+    if (propagates && umb_past_hides(past, image)) {
+        w->stats.saved += 1;
+        return true;
+    }
     umb_asker asker = {w->culler->ops, w->culler->method, &w->map, &w->stats};
-    return umb_detail_hidden(&asker, image, NULL);
+    bool is = umb_detail_hidden(&asker, image, NULL);
+    if (is && propagates) {
+        umb_past_hidden(past, image);
+    }
+    return is;
 }
 
 static void count_hidden(walk *w, uint32_t ref)
@@ -182,20 +209,32 @@ static void fetch(const walk *w, uint32_t ref)
     }
 }
 
-static void push(walk *w, const umb_node *node, const umb_projected *p, uint32_t slot, uint16_t planes)
+/* Eight boxes that are tested together. */
+typedef struct opening {
+    const umb_node *boxes;
+    uint32_t number; /* of the node; UMB_NONE: it is none of the tree's */
+    uint16_t planes; /* that its boxes may cross */
+    uint8_t *remember;
+    uint16_t child_planes[UMB_NODE_WIDTH];
+} opening;
+
+static umb_image image_of(const umb_projected *p, uint32_t slot)
+{
+    return (umb_image){{(int16_t)p->x0[slot], (int16_t)p->y0[slot], (int16_t)p->x1[slot], (int16_t)p->y1[slot]},
+                       p->nearness[slot]};
+}
+
+static void push(walk *w, const opening *o, const umb_projected *p, uint32_t slot, uint16_t planes)
 {
     umb_heap *heap = &w->culler->heap;
     uint32_t taken = umb_heap_take(heap);
     umb_waiting *item = &heap->slots[taken];
     item->nearest = p->w_min[slot];
     item->settled = p->w_max[slot] < w->most_w ? p->w_max[slot] : w->most_w;
-    item->ref = node->ref[slot];
+    item->ref = o->boxes->ref[slot];
+    item->node = o->number;
     item->stamp = w->drawn;
-    item->image.rect.x0 = (int16_t)p->x0[slot];
-    item->image.rect.y0 = (int16_t)p->y0[slot];
-    item->image.rect.x1 = (int16_t)p->x1[slot];
-    item->image.rect.y1 = (int16_t)p->y1[slot];
-    item->image.nearness = p->nearness[slot];
+    item->image = image_of(p, slot);
     item->part = 0;
     item->planes = planes;
     item->testable = (p->testable >> slot & 1u) != 0;
@@ -204,49 +243,154 @@ static void push(walk *w, const umb_node *node, const umb_projected *p, uint32_t
     fetch(w, item->ref);
 }
 
-static void open_node(walk *w, uint32_t number, uint16_t planes)
+/* True if it need not be asked about. */
+static bool is_known(const umb_past *past, uint32_t ref)
+{
+    switch (ref & UMB_REF_KIND) {
+    case UMB_REF_NODE:
+        return umb_past_node_open(past, ref & UMB_REF_NUMBER);
+    case UMB_REF_OBJECT:
+        return umb_past_object_seen(past, ref & UMB_REF_NUMBER);
+    default:
+        return false;
+    }
+}
+
+static uint32_t all_known(const umb_past *past, const umb_node *boxes, uint32_t mask)
+{
+    uint32_t known = 0;
+    for (; mask != 0; mask &= mask - 1) {
+        uint32_t slot = (uint32_t)__builtin_ctz(mask);
+        known |= is_known(past, boxes->ref[slot]) ? 1u << slot : 0;
+    }
+    return known;
+}
+
+/* Which of the boxes in mask are hidden. */
+static uint32_t ask(walk *w, const umb_projected *projected, uint32_t mask)
+{
+    const umb_culler *c = w->culler;
+    w->stats.queries += (uint32_t)__builtin_popcount(mask);
+    return mask != 0 ? c->ops->hides(c->method, projected, mask) : 0;
+}
+
+static uint32_t ask_by_neighbours(walk *w, const umb_projected *projected, uint32_t mask)
+{
+    umb_past *past = &w->culler->past;
+    uint32_t hides = 0;
+    for (uint32_t left = mask; left != 0; left &= left - 1) {
+        uint32_t slot = (uint32_t)__builtin_ctz(left);
+        umb_image image = image_of(projected, slot);
+        hides |= umb_past_hides(past, &image) ? 1u << slot : 0;
+    }
+    w->stats.saved += (uint32_t)__builtin_popcount(hides);
+    uint32_t found = ask(w, projected, mask & ~hides);
+    for (uint32_t left = found; left != 0; left &= left - 1) {
+        umb_image image = image_of(projected, (uint32_t)__builtin_ctz(left));
+        umb_past_hidden(past, &image);
+    }
+    return hides | found;
+}
+
+/* Test eight boxes and have those wait that may be seen. */
+static void open_boxes(walk *w, opening *o)
 {
     umb_culler *c = w->culler;
-    const umb_node *node = &w->tree->nodes[number];
-    uint16_t child_planes[UMB_NODE_WIDTH];
-    uint32_t outside = umb_frustum_test_node(&w->frustum, c->kernels, node, planes,
-                                             &c->planes[number], child_planes);
-    uint32_t left = ~outside & ((1u << node->count) - 1u);
-    w->stats.nodes += 1;
-    w->stats.boxes += node->count;
+    const umb_node *boxes = o->boxes;
+    uint32_t outside = umb_frustum_test_node(&w->frustum, c->kernels, boxes, o->planes, o->remember, o->child_planes);
+    uint32_t left = ~outside & ((1u << boxes->count) - 1u);
+    w->stats.boxes += boxes->count;
     if (left == 0) {
         return;
     }
     umb_projected projected;
-    c->kernels->project(node, &w->projector, &projected);
-    uint32_t hides = projected.beside & left;
-    if (c->ops != NULL) {
-        uint32_t ask = projected.testable & left & ~hides;
-        hides |= c->ops->hides(c->method, &projected, ask);
-        w->stats.queries += (uint32_t)__builtin_popcount(ask);
+    c->kernels->project(boxes, &w->projector, &projected);
+    uint32_t hides = projected.beside & left, sure = 0;
+    if (c->past.switches != 0) {
+        sure = all_known(&c->past, boxes, left & ~hides);
+        w->stats.saved += (uint32_t)__builtin_popcount(sure & projected.testable);
+    }
+    if (c->ops != NULL && w->drawn != 0) {
+        uint32_t mask = projected.testable & left & ~hides & ~sure;
+        hides |= umb_past_has(&c->past, UMB_COHERENCE_PROPAGATION) ? ask_by_neighbours(w, &projected, mask)
+                                                                     : ask(w, &projected, mask);
     }
     for (; left != 0; left &= left - 1) {
-        uint32_t slot = (uint32_t)__builtin_ctz(left);
-        w->stats.in_frustum += (node->ref[slot] & UMB_REF_KIND) == UMB_REF_OBJECT;
+        uint32_t slot = (uint32_t)__builtin_ctz(left), ref = boxes->ref[slot];
+        w->stats.in_frustum += (ref & UMB_REF_KIND) == UMB_REF_OBJECT;
         if ((hides >> slot & 1u) != 0) {
-            count_hidden(w, node->ref[slot]);
-        } else if (!too_small(w, node, slot)) {
-            push(w, node, &projected, slot, child_planes[slot]);
+            count_hidden(w, ref);
+        } else if (!too_small(w, boxes, slot)) {
+            push(w, o, &projected, slot, o->child_planes[slot]);
         }
     }
 }
 
-/* Draw an occluder, unless its box's image is too small to cover anything worth having: a
- * silhouette of two pixels across covers one at most. */
-static void draw(walk *w, uint32_t occluder, const umb_waiting *item)
+static void open_node(walk *w, uint32_t number, uint16_t planes)
+{
+    opening o = {.boxes = &w->tree->nodes[number],
+                 .number = number,
+                 .planes = planes,
+                 .remember = &w->culler->planes[number]};
+    w->stats.nodes += 1;
+    open_boxes(w, &o);
+}
+
+/* True if drawing an occluder is sure, or all but sure, to change nothing (Gummerus 5.2, redundancy): its box's image
+ * is too small, or there is no open pixel left in it. Where every pixel is covered a drawing could still bring the
+ * depth of a sub-tile nearer that it covers alone; that takes a large image. */
+static bool is_idle(walk *w, uint32_t occluder, const umb_waiting *item)
 {
     const umb_culler *c = w->culler;
     const umb_pixel_rect *r = &item->image.rect;
-    if (c->ops == NULL || occluder == UMB_NONE ||
-        (item->testable && (r->x1 - r->x0 < LEAST_PIXELS || r->y1 - r->y0 < LEAST_PIXELS))) {
+    if (!item->testable) {
+        return false;
+    }
+    int side = r->x1 - r->x0 < r->y1 - r->y0 ? r->x1 - r->x0 : r->y1 - r->y0;
+    if (side < (w->scene->occluders[occluder].mesh->convex ? LEAST_PIXELS : LEAST_MESH_PIXELS)) {
+        return true;
+    }
+    if (side >= DEPTH_PIXELS || w->drawn == 0) {
+        return false;
+    }
+    umb_image pixels = {*r, -FLT_MAX};
+    w->stats.queries += 1;
+    return c->ops->hidden(c->method, &pixels, NULL);
+}
+
+/* Draw an occluder, unless it is not worth it. */
+static void draw(walk *w, uint32_t occluder, const umb_waiting *item)
+{
+    const umb_culler *c = w->culler;
+    if (c->ops == NULL || occluder == UMB_NONE) {
         return;
     }
-    w->drawn += c->ops->occlude(c->method, occluder, &w->stats);
+    if (is_idle(w, occluder, item)) {
+        w->stats.idle += 1;
+        return;
+    }
+    umb_past *past = &w->culler->past;
+    if (!umb_past_on(past)) {
+        w->drawn += c->ops->occlude(c->method, occluder, &w->stats);
+        return;
+    }
+    const umb_pixel_rect *rect = item->testable ? &item->image.rect : NULL;
+    const umb_mesh *mesh = w->scene->occluders[occluder].mesh;
+    switch (umb_past_judge(past, occluder, rect)) {
+    case UMB_PAST_DONE:
+        break;
+    case UMB_PAST_RESTS:
+        w->stats.resting += 1;
+        break;
+    case UMB_PAST_COSTS:
+        w->stats.over_budget += 1;
+        break;
+    case UMB_PAST_DRAW: {
+        bool changed = c->ops->occlude(c->method, occluder, &w->stats);
+        w->drawn += changed;
+        umb_past_drew(past, occluder, rect, changed, !mesh->convex);
+    } break;
+    }
 }
 
 static void report(walk *w, const umb_waiting *item)
@@ -256,6 +400,9 @@ static void report(walk *w, const umb_waiting *item)
     f->key = item->nearest;
     f->id = item->ref & UMB_REF_NUMBER;
     f->inside = item->planes == 0;
+    if (c->past.switches != 0) {
+        umb_past_saw(&c->past, w->tree, f->id, item->node);
+    }
 }
 
 /* True if the object may be seen, asked in detail when its shape is all that is drawn. */
@@ -289,6 +436,11 @@ static bool object_shows(walk *w, const umb_object *o, umb_waiting *item)
 static bool visit_object(walk *w, umb_waiting *item, const umb_heap_entry *entry)
 {
     const umb_object *o = &w->scene->objects[item->ref & UMB_REF_NUMBER];
+    if (w->culler->past.switches != 0 && umb_past_object_seen(&w->culler->past, item->ref & UMB_REF_NUMBER)) {
+        draw(w, o->occluder, item);
+        report(w, item);
+        return false;
+    }
     bool first = !item->waited, hides = o->occluder != UMB_NONE;
     bool can_wait = w->culler->ops != NULL;
     bool settled = !can_wait || !(item->settled > umb_heap_key(entry));
@@ -310,18 +462,28 @@ static bool visit_object(walk *w, umb_waiting *item, const umb_heap_entry *entry
     return true;
 }
 
-static void run(walk *w)
+/* An entry that comes up is hidden by now. */
+static bool found_hidden(walk *w, const umb_waiting *item)
+{
+    const umb_past *past = &w->culler->past;
+    if (!item->testable || item->stamp == w->drawn) {
+        return false;
+    }
+    if (past->switches != 0 && is_known(past, item->ref)) {
+        w->stats.saved += 1;
+        return false;
+    }
+    return hidden(w, &item->image);
+}
+
+static void run_queue(walk *w)
 {
     umb_heap *heap = &w->culler->heap;
-    uint32_t roots = w->tree->flat ? w->tree->node_count : w->tree->node_count > 0;
-    for (uint32_t i = 0; i < roots; ++i) {
-        open_node(w, i, w->frustum.all_planes);
-    }
     while (heap->count > 0) {
         umb_heap_entry entry = umb_heap_pop(heap);
         umb_waiting *item = &heap->slots[entry.slot];
         bool waits = false;
-        if (item->testable && item->stamp != w->drawn && hidden(w, &item->image)) {
+        if (found_hidden(w, item)) {
             count_hidden(w, item->ref);
         } else if ((item->ref & UMB_REF_KIND) == UMB_REF_NODE) {
             open_node(w, item->ref & UMB_REF_NUMBER, item->planes);
@@ -334,6 +496,43 @@ static void run(walk *w)
             umb_heap_give(heap, entry.slot);
         }
     }
+}
+
+/* The occluders of the last frame's list, eight at a time, as if they were all that there is: nearest first, and
+ * not those that are hidden. */
+static void draw_early(walk *w)
+{
+    const umb_past *past = &w->culler->past;
+    for (uint32_t i = 0; i < past->early_count; i += UMB_NODE_WIDTH) {
+        umb_node boxes;
+        boxes.count = past->early_count - i < UMB_NODE_WIDTH ? past->early_count - i : UMB_NODE_WIDTH;
+        for (uint32_t slot = 0; slot < UMB_NODE_WIDTH; ++slot) {
+            uint32_t number = past->early[i + (slot < boxes.count ? slot : 0)];
+            const umb_aabb *box = &w->scene->occluders[number].bounds;
+            boxes.ref[slot] = slot < boxes.count ? UMB_REF_OCCLUDER | number : UMB_NONE;
+            for (int axis = 0; axis < 3; ++axis) {
+                boxes.min[axis][slot] = box->min[axis];
+                boxes.max[axis][slot] = box->max[axis];
+            }
+        }
+        uint8_t remember = 0;
+        opening o = {.boxes = &boxes, .number = UMB_NONE, .planes = w->frustum.all_planes, .remember = &remember};
+        open_boxes(w, &o);
+    }
+    run_queue(w);
+    w->stats.early = w->stats.occluders;
+}
+
+static void run(walk *w)
+{
+    uint32_t roots = w->tree->flat ? w->tree->node_count : w->tree->node_count > 0;
+    if (umb_past_has(&w->culler->past, UMB_COHERENCE_LIST)) {
+        draw_early(w);
+    }
+    for (uint32_t i = 0; i < roots; ++i) {
+        open_node(w, i, w->frustum.all_planes);
+    }
+    run_queue(w);
 }
 
 static void prepare_projector(umb_projector *p, const umb_raster_map *map)
@@ -390,12 +589,17 @@ umb_result umb_cull(umb_culler *c, const umb_view *view, umb_visible_set *out)
     if (ready) {
         prepare_walk(&w, c, view);
         ready = c->ops == NULL || c->ops->prepare(c->method, &w.map, w.scene) == UMB_OK;
+        ready = ready && (!umb_past_on(&c->past) ||
+                          umb_past_begin(&c->past, &c->allocator, w.tree, w.scene, &w.map));
     }
     if (!ready) {
         return umb_error_set(c->def.error, UMB_ERROR_MEMORY, "no memory for the frame");
     }
     umb_heap_clear(&c->heap);
     run(&w);
+    if (umb_past_on(&c->past)) {
+        umb_past_end(&c->past);
+    }
     umb_found_sort(c->found, c->count);
     for (uint32_t i = 0; i < c->count; ++i) {
         c->objects[i] = c->found[i].id;

@@ -13,6 +13,7 @@ typedef struct umb_waiting {
     float nearest;   /* least W of its box (raster_map.h): the key at first */
     float settled;   /* objects: the W beyond which nothing drawn can hide what keeps it visible */
     uint32_t ref;    /* index/tree.h */
+    uint32_t node;   /* that it is in; UMB_NONE: it came by itself */
     uint32_t stamp;  /* how many occluders had been drawn when it was last tested */
     umb_image image; /* meaningful if testable */
     uint32_t part;   /* objects: parts before this one are hidden */

@@ -1,0 +1,201 @@
+#include "past.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* Frames count from 2, so that the zeros of fresh arrays are no recent frame. */
+#define FIRST_FRAME 2u
+
+static bool reserve(umb_past *p, const umb_allocator *a, const umb_tree *tree, const umb_committed *scene)
+{
+    bool list = umb_past_has(p, UMB_COHERENCE_LIST);
+    size_t nodes = umb_past_has(p, UMB_COHERENCE_HIERARCHY) ? tree->node_count : 0;
+    size_t objects = umb_past_has(p, UMB_COHERENCE_CONSERVATIVE) ? scene->object_count : 0;
+    size_t occluders = scene->occluder_count;
+    return umb_memory_reserve(a, (void **)&p->open, &p->open_capacity, nodes, sizeof *p->open) &&
+           umb_memory_reserve(a, (void **)&p->seen, &p->seen_capacity, objects, sizeof *p->seen) &&
+           umb_memory_reserve(a, (void **)&p->occluders, &p->occluder_capacity, occluders, sizeof *p->occluders) &&
+           umb_memory_reserve(a, (void **)&p->early, &p->early_capacity, list ? occluders : 0, sizeof *p->early) &&
+           umb_memory_reserve(a, (void **)&p->next, &p->next_capacity, list ? occluders : 0, sizeof *p->next);
+}
+
+static void clear(void *array, size_t capacity, size_t size)
+{
+    if (capacity > 0) {
+        memset(array, 0, capacity * size);
+    }
+}
+
+static void forget(umb_past *p)
+{
+    clear(p->open, p->open_capacity, sizeof *p->open);
+    clear(p->seen, p->seen_capacity, sizeof *p->seen);
+    clear(p->occluders, p->occluder_capacity, sizeof *p->occluders);
+    for (size_t i = 0; i < p->occluder_capacity; ++i) {
+        p->occluders[i].worth = 255;
+    }
+    clear(p->places, p->place_capacity, sizeof *p->places);
+    p->early_count = p->next_count = 0;
+    p->least_score = 0;
+    p->frame = FIRST_FRAME;
+}
+
+static bool reserve_places(umb_past *p, const umb_allocator *a, const umb_raster_map *map)
+{
+    if (!umb_past_has(p, UMB_COHERENCE_PROPAGATION)) {
+        return true;
+    }
+    size_t before = p->place_capacity;
+    p->columns = (map->width + UMB_TILE_WIDTH - 1) / UMB_TILE_WIDTH;
+    p->rows = (map->height + UMB_TILE_HEIGHT - 1) / UMB_TILE_HEIGHT;
+    if (!umb_memory_reserve(a, (void **)&p->places, &p->place_capacity, (size_t)p->columns * p->rows,
+                            sizeof *p->places)) {
+        return false;
+    }
+    clear(p->places + before, p->place_capacity - before, sizeof *p->places);
+    return true;
+}
+
+bool umb_past_begin(umb_past *p, const umb_allocator *a, const umb_tree *tree, const umb_committed *scene,
+                    const umb_raster_map *map)
+{
+    bool same = p->frame != 0 && p->frame != UINT32_MAX && p->structure == scene->structure &&
+                p->node_count == tree->node_count;
+    if (!reserve_places(p, a, map)) {
+        return false;
+    }
+    if (!same) {
+        p->frame = 0;
+        if (!reserve(p, a, tree, scene)) {
+            return false;
+        }
+        forget(p);
+        p->structure = scene->structure;
+        p->node_count = tree->node_count;
+    }
+    p->width = map->width;
+    p->height = map->height;
+    p->next_count = 0;
+    p->left = p->budget;
+    if (p->budget != 0) {
+        memset(p->scores, 0, sizeof p->scores);
+    }
+    return true;
+}
+
+/* The next frame's least score: as many of this frame's occluders as the budget allows reach it. */
+static void choose_score(umb_past *p)
+{
+    uint32_t sum = 0, score = UMB_PAST_SCORES;
+    while (score > 0 && sum + p->scores[score - 1] <= p->budget) {
+        sum += p->scores[--score];
+    }
+    /* The best are too many in one class: the walk's order decides among them. */
+    p->least_score = sum == 0 && score > 0 ? score - 1 : score;
+}
+
+void umb_past_end(umb_past *p)
+{
+    uint32_t *list = p->early;
+    size_t capacity = p->early_capacity;
+    p->early = p->next;
+    p->early_capacity = p->next_capacity;
+    p->early_count = p->next_count;
+    p->next = list;
+    p->next_capacity = capacity;
+    if (p->budget != 0) {
+        choose_score(p);
+    }
+    p->frame += 1;
+}
+
+void umb_past_free(umb_past *p, const umb_allocator *a)
+{
+    umb_memory_free(a, p->open, p->open_capacity * sizeof *p->open);
+    umb_memory_free(a, p->seen, p->seen_capacity * sizeof *p->seen);
+    umb_memory_free(a, p->occluders, p->occluder_capacity * sizeof *p->occluders);
+    umb_memory_free(a, p->early, p->early_capacity * sizeof *p->early);
+    umb_memory_free(a, p->next, p->next_capacity * sizeof *p->next);
+    umb_memory_free(a, p->places, p->place_capacity * sizeof *p->places);
+    memset(p, 0, sizeof *p);
+}
+
+static size_t place_of(const umb_past *p, const umb_image *image)
+{
+    uint32_t x = (uint32_t)(image->rect.x0 + image->rect.x1) / 2 / UMB_TILE_WIDTH;
+    uint32_t y = (uint32_t)(image->rect.y0 + image->rect.y1) / 2 / UMB_TILE_HEIGHT;
+    return (size_t)y * p->columns + x;
+}
+
+bool umb_past_hides(const umb_past *p, const umb_image *image)
+{
+    const umb_hidden_place *h = &p->places[place_of(p, image)];
+    const umb_pixel_rect *out = &h->image.rect, *in = &image->rect;
+    return h->frame == p->frame && h->image.nearness >= image->nearness && out->x0 <= in->x0 &&
+           out->y0 <= in->y0 && out->x1 >= in->x1 && out->y1 >= in->y1;
+}
+
+void umb_past_hidden(umb_past *p, const umb_image *image)
+{
+    umb_hidden_place *h = &p->places[place_of(p, image)];
+    h->image = *image;
+    h->frame = p->frame;
+}
+
+/* A number that grows with the logarithm of pixels times worth, four steps an octave. */
+static uint32_t score_of(const umb_occluder_past *o, uint32_t pixels)
+{
+    uint64_t product = (uint64_t)pixels * (1u + o->worth) + 8;
+    uint32_t top = 63u - (uint32_t)__builtin_clzll(product);
+    return 4 * top + (uint32_t)(product >> (top - 2) & 3u);
+}
+
+/* An image that has gone far, or that has grown or shrunk, is of another view. */
+static bool much_the_same(const umb_past *p, const umb_pixel_rect *a, const umb_pixel_rect *b)
+{
+    int32_t width = a->x1 - a->x0 + 1, height = a->y1 - a->y0 + 1;
+    int32_t wider = abs(b->x1 - b->x0 + 1 - width), higher = abs(b->y1 - b->y0 + 1 - height);
+    int32_t gone = abs(b->x0 - a->x0) + abs(b->y0 - a->y0);
+    return wider <= 2 + width / 4 && higher <= 2 + height / 4 && gone <= (int32_t)p->width / 16;
+}
+
+umb_past_verdict umb_past_judge(umb_past *p, uint32_t occluder, const umb_pixel_rect *rect)
+{
+    const umb_occluder_past *o = &p->occluders[occluder];
+    if (o->drawn == p->frame) {
+        return UMB_PAST_DONE;
+    }
+    if (umb_past_has(p, UMB_COHERENCE_REST) && o->rests > p->frame &&
+        (rect == NULL ? o->rect.x0 > o->rect.x1 : much_the_same(p, &o->rect, rect))) {
+        return UMB_PAST_RESTS;
+    }
+    if (p->budget != 0) {
+        uint32_t score = score_of(o, rect == NULL ? p->width * p->height
+                                                  : (uint32_t)(rect->x1 - rect->x0 + 1) *
+                                                        (uint32_t)(rect->y1 - rect->y0 + 1));
+        p->scores[score] += 1;
+        if (score < p->least_score || p->left == 0) {
+            return UMB_PAST_COSTS;
+        }
+        p->left -= 1;
+    }
+    return UMB_PAST_DRAW;
+}
+
+void umb_past_drew(umb_past *p, uint32_t occluder, const umb_pixel_rect *rect, bool changed, bool costly)
+{
+    umb_occluder_past *o = &p->occluders[occluder];
+    o->drawn = p->frame;
+    o->rect = rect != NULL ? *rect : (umb_pixel_rect){1, 1, 0, 0};
+    o->worth = (uint8_t)(o->worth - o->worth / 4 + (changed ? 63 : 0));
+    if (changed) {
+        o->idle = 0;
+        if (umb_past_has(p, UMB_COHERENCE_LIST)) {
+            p->next[p->next_count++] = occluder;
+        }
+    } else if (costly) {
+        /* Nothing tells whether one at the eye is still the same sight: it is looked at every other frame. */
+        o->rests = p->frame + 1 + (rect != NULL ? 1u << o->idle : 1u);
+        o->idle = (uint8_t)(o->idle < UMB_PAST_LONGEST_REST ? o->idle + 1 : o->idle);
+    }
+}
