@@ -201,6 +201,9 @@ static void list_edges(raster *r)
     }
 }
 
+/* Planes are used when they are at no corner of the front farther than this part of its depth. */
+#define PLANES_FIT 0x1p-6
+
 /* A plane in floats, and how far it must be lowered to lie under all of the front: under its corners, since both
  * are affine between them. A front that is cut has corners that are not kept. */
 static void store_plane(const raster *r, const umb_occluder *o, const umb_silhouette_plane *p,
@@ -227,6 +230,32 @@ static void store_plane(const raster *r, const umb_occluder *o, const umb_silhou
     }
 }
 
+/* True if the planes together give the front's corners about the depth that they have: where the front bulges in one
+ * place and is hollow in another, they do not. */
+static bool planes_fit(const raster *r, const umb_occluder *o)
+{
+    const umb_silhouette *s = &r->silhouette;
+    const umb_mesh_fill *f = &r->fill;
+    for (uint32_t i = 0; i < s->front_count && !s->cut; ++i) {
+        for (int j = 0; j < 3; ++j) {
+            uint32_t k = o->mesh->triangles[s->front[i]][j];
+            double some = INFINITY, every = -INFINITY;
+            for (uint32_t p = 0; p < f->plane_count; ++p) {
+                const umb_fill_plane *plane = &f->planes[p];
+                double at = plane->gx * s->x[k] + plane->gy * s->y[k], low = at + plane->low;
+                low = low > plane->least ? low : plane->least;
+                some = low < some ? low : some;
+                every = at + plane->every > every ? at + plane->every : every;
+            }
+            double bound = some > every ? some : every;
+            if (bound < s->near_least[k] - PLANES_FIT * fabs(s->near_least[k])) {
+                return false;
+            }
+        }
+    }
+    return !s->cut;
+}
+
 /* The planes of the front, a triangle at a time; false if there are too many. */
 static bool list_planes(raster *r, const umb_occluder *o)
 {
@@ -251,7 +280,7 @@ static bool list_planes(raster *r, const umb_occluder *o)
         store_plane(r, o, &planes[k], &f->planes[k]);
     }
     f->plane_count = count;
-    return true;
+    return count == 1 || planes_fit(r, o);
 }
 
 /* Depth of the front: by planes, or one bound if its image is small; else triangle by triangle. */

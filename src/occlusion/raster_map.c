@@ -7,8 +7,8 @@
 #define BAND 0.02
 /* The band reaches lower where the eye is high above the scene, at most by this slope. */
 #define MOST_DROP 0.1
-/* A scene is tall when its height is more than this part of its diagonal. */
-#define MOST_TALL 0.4
+/* A scene lies flat when its height is at most this part of its diagonal. */
+#define MOST_TALL 0.1
 /* The raster is levelled while every direction of the view is this far ahead of it (a cosine): beyond,
  * a levelled raster would be mostly sky. */
 #define LEAST_AHEAD 0.3
@@ -139,11 +139,10 @@ static bool unroll_frame(frame *f, const umb_view *v, umb_vec3 vertical)
 }
 
 /* How far below the horizon the scene's far end lies, as a slope: the eye's height above the lowest point over
- * the way to the farthest. That is where most of what is far away is seen. NAN if the scene is as tall as wide:
- * what is far away is then seen everywhere. */
+ * the way to the farthest. That is where most of what is far away is seen. */
 static double find_drop(const umb_view *v, umb_vec3 vertical, const umb_aabb *scene)
 {
-    double height = 0.0, reach = 0.0, low = INFINITY, high = -INFINITY;
+    double height = 0.0, reach = 0.0;
     for (int k = 0; k < 8; ++k) {
         umb_vec3 d = {(k & 1 ? scene->max[0] : scene->min[0]) - v->eye[0],
                       (k & 2 ? scene->max[1] : scene->min[1]) - v->eye[1],
@@ -151,17 +150,20 @@ static double find_drop(const umb_view *v, umb_vec3 vertical, const umb_aabb *sc
         double up = umb_vec3_dot(d, vertical);
         double across = umb_vec3_length(umb_vec3_sub(d, umb_vec3_scale(vertical, up)));
         height = -up > height ? -up : height;
-        low = up < low ? up : low;
-        high = up > high ? up : high;
         reach = across > reach ? across : reach;
-    }
-    umb_vec3 size = {(double)scene->max[0] - scene->min[0], (double)scene->max[1] - scene->min[1],
-                     (double)scene->max[2] - scene->min[2]};
-    if (high - low > MOST_TALL * umb_vec3_length(size)) {
-        return NAN;
     }
     double drop = reach > 0.0 ? height / reach : 0.0;
     return drop < MOST_DROP ? drop : MOST_DROP;
+}
+
+/* True if the scene lies on the ground: wide, and of little height along the vertical. Only then are far things seen
+ * close to the horizon, and most edges oblique in a tilted picture upright ones of boxes. */
+static bool lies_flat(umb_vec3 vertical, const umb_aabb *scene)
+{
+    umb_vec3 size = {(double)scene->max[0] - scene->min[0], (double)scene->max[1] - scene->min[1],
+                     (double)scene->max[2] - scene->min[2]};
+    double height = fabs(size.x * vertical.x) + fabs(size.y * vertical.y) + fabs(size.z * vertical.z);
+    return height <= MOST_TALL * umb_vec3_length(size);
 }
 
 static frame choose_frame(const umb_view *v, const umb_aabb *scene)
@@ -172,7 +174,9 @@ static frame choose_frame(const umb_view *v, const umb_aabb *scene)
     if (v->projection == UMB_PERSPECTIVE && size > 0.0) {
         umb_vec3 vertical = {c[0] / size, c[1] / size, c[2] / size};
         vertical = umb_vec3_scale(vertical, 1.0 / umb_vec3_length(vertical));
-        if (level_frame(&f, v, vertical) || unroll_frame(&f, v, vertical)) {
+        bool flat = scene == NULL || lies_flat(vertical, scene);
+        if ((flat && level_frame(&f, v, vertical)) || unroll_frame(&f, v, vertical)) {
+            f.horizon = flat ? f.horizon : NAN;
             f.drop = scene != NULL ? find_drop(v, vertical, scene) : 0.0;
             return f;
         }
