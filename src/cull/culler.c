@@ -535,6 +535,29 @@ static void run(walk *w)
     run_queue(w);
 }
 
+/* The first task is the walk; the others find ahead what it will want, and return when it has ended. */
+static void run_task(void *data, uint32_t i)
+{
+    walk *w = data;
+    umb_culler *c = w->culler;
+    if (i > 0) {
+        c->ops->help(c->method, i - 1);
+        return;
+    }
+    run(w);
+    if (c->ops != NULL) {
+        c->ops->finish(c->method);
+    }
+}
+
+static void run_all(walk *w)
+{
+    umb_culler *c = w->culler;
+    const umb_tasks *tasks = &c->def.tasks;
+    uint32_t helpers = c->ops != NULL && tasks->run != NULL ? c->ops->look_ahead(c->method, tasks->workers) : 0;
+    umb_tasks_run(tasks, run_task, w, 1 + helpers);
+}
+
 static void prepare_projector(umb_projector *p, const umb_raster_map *map)
 {
     const double eye[3] = {map->eye.x, map->eye.y, map->eye.z}, x[3] = {map->x.x, map->x.y, map->x.z};
@@ -596,7 +619,7 @@ umb_result umb_cull(umb_culler *c, const umb_view *view, umb_visible_set *out)
         return umb_error_set(c->def.error, UMB_ERROR_MEMORY, "no memory for the frame");
     }
     umb_heap_clear(&c->heap);
-    run(&w);
+    run_all(&w);
     if (umb_past_on(&c->past)) {
         umb_past_end(&c->past);
     }
@@ -668,6 +691,11 @@ bool umb_culler_read_buffer(const umb_culler *c, float *pixels, size_t capacity,
 const umb_index *umb_culler_index(const umb_culler *culler)
 {
     return culler->index;
+}
+
+const umb_coverage *umb_culler_coverage(const umb_culler *culler)
+{
+    return culler->ops != NULL && culler->answered ? culler->ops->buffer(culler->method) : NULL;
 }
 
 umb_culler_def umb_culler_settings(const umb_culler *culler)

@@ -4,6 +4,7 @@
  *   hides        ask about a node's boxes; const, so that batches may be asked from several threads
  *   hidden       ask about one box, or one triangle in it
  *   occlude      add one occluder that the walk has reached
+ *   look_ahead, help, finish: what other threads can do meanwhile
  *
  * Questions carry the box's image on the raster, which the walk computes for its order anyway. That
  * something is hidden is a promise; anything else is none.
@@ -44,6 +45,12 @@ typedef struct umb_method_ops {
     /* True if the answers to later queries may differ for it. */
     bool (*occlude)(void *state, uint32_t occluder, umb_cull_stats *stats);
     const umb_coverage *(*buffer)(const void *state);
+    /* After prepare, for a walk beside which workers - 1 other threads are free: how many helpers this frame is
+       worth. help may then be called once for each, at any time until finish or after it, while the thread of
+       the walk calls what it likes of the above. Answers do not depend on any of it. */
+    uint32_t (*look_ahead)(void *state, uint32_t workers);
+    void (*help)(void *state, uint32_t helper);
+    void (*finish)(void *state); /* the walk has ended: helpers return soon */
 } umb_method_ops;
 
 /* NULL for UMB_METHOD_NONE, which hides nothing. */

@@ -32,6 +32,16 @@ typedef struct umb_mesh_fill {
 
 #define UMB_ROW_TILE_BYTES 256
 
+/* An occluder's image by itself, which is a function of the view and the occluder alone: what it covers of each
+ * tile, and how near. */
+typedef struct umb_tile_list {
+    umb_tile *tiles;   /* masks, and depths where a mask has bits of the sub-tile */
+    uint32_t *numbers; /* of the tiles, row by row */
+    uint32_t count, capacity;
+    bool full;  /* there were more tiles than there is room for */
+    float most; /* nearness of the occluder is nowhere more */
+} umb_tile_list;
+
 typedef struct umb_raster_kernels {
     umb_isa isa;
     /* For the boxes of a mask, which must be testable and not beside the raster: a bit for each whose
@@ -52,6 +62,10 @@ typedef struct umb_raster_kernels {
     /* Add what any occluder covers: its outline and, unless there are planes, its depth triangles are found. True if
        the buffer changed. */
     bool (*fill_mesh)(umb_coverage *c, const umb_raster_map *map, umb_silhouette *s, umb_mesh_fill *fill);
+    /* The same in two steps, the buffer's bits being the same too: note what is covered, false if there is no room
+       for all of it; and add what was noted. */
+    bool (*list_mesh)(umb_tile_list *list, const umb_raster_map *map, umb_silhouette *s, umb_mesh_fill *fill);
+    bool (*merge_list)(umb_coverage *c, const umb_tile_list *list);
 } umb_raster_kernels;
 
 /* The kernels of an instruction set, AUTO for the best; NULL when it is not available. */

@@ -697,7 +697,8 @@ static inline void draw_edge(row_window *w, const umb_outline_edge *e, const dou
 
 /* What is covered in a row of tiles, left to right; the winding number at a tile's last column goes on into the
  * next. Tiles without edges are all alike. A tile is wanted if the occluder covers open pixels there, or closed ones
- * perhaps from nearer. */
+ * perhaps from nearer. Without a buffer whatever is covered is wanted: merging more gives the same bits, because no
+ * bound is above most where a pixel is covered, so that one which is not wanted raises nothing. */
 static inline void sweep(const umb_coverage *c, row_window *w, size_t row, float most)
 {
     umb_iv zero = umb_iv_set(0);
@@ -710,11 +711,10 @@ static inline void sweep(const umb_coverage *c, row_window *w, size_t row, float
     for (uint32_t tx = w->first; tx <= w->tx1 && (covers || tx <= w->last); ++tx) {
         struct umb_row_tile *t = &w->tiles[tx];
         bool edged = w->state[tx] == TILE_EDGED;
-        bool closed = c->coarse[row + tx] >= most;
+        bool closed = c != NULL && c->coarse[row + tx] >= most;
         if (!edged && (closed || !covers)) {
             continue;
         }
-        const umb_tile *tile = &c->tiles[row + tx];
         umb_iv wanted = zero, on = zero;
         w->state[tx] = TILE_IDLE;
         for (int i = 0; i < UMB_PARTS; ++i) {
@@ -734,10 +734,13 @@ static inline void sweep(const umb_coverage *c, row_window *w, size_t row, float
             }
             int at = i * UMB_LANES;
             umb_iv byte = umb_iv_load(SUB_BYTE + at);
-            umb_iv fresh = (umb_iv_or_fours(mask & ~umb_iv_load(tile->mask + at)) & byte) != 0;
-            umb_iv nearer = umb_fv_load(tile->z + at) < most;
-            umb_iv some = (umb_iv_or_fours(mask) & byte) != 0;
-            umb_iv want = fresh | (some & nearer);
+            umb_iv want = (umb_iv_or_fours(mask) & byte) != 0;
+            if (c != NULL) {
+                const umb_tile *tile = &c->tiles[row + tx];
+                umb_iv fresh = (umb_iv_or_fours(mask & ~umb_iv_load(tile->mask + at)) & byte) != 0;
+                umb_iv nearer = umb_fv_load(tile->z + at) < most;
+                want = fresh | (want & nearer);
+            }
             t->wanted[i] = want;
             /* Pixels of sub-tiles that nothing is wanted of are dropped. */
             t->mask[i] = mask & umb_iv_spread(want);
@@ -823,9 +826,30 @@ static inline void lower_row_by_planes(const row_window *w, const umb_mesh_fill 
     }
 }
 
-static inline bool merge_row(umb_coverage *c, row_window *w, size_t row, bool held)
+/* Where a row of tiles goes: into the buffer, or into a list. */
+typedef struct row_sink {
+    umb_coverage *coverage; /* NULL: into the list */
+    umb_tile_list *list;
+    size_t columns;
+    bool changed; /* the buffer */
+} row_sink;
+
+static inline void append_parts(umb_tile_list *l, size_t number, const tile_part parts[UMB_PARTS])
 {
-    bool changed = false;
+    if (l->count >= l->capacity) {
+        l->full = true;
+        return;
+    }
+    umb_tile *tile = &l->tiles[l->count];
+    l->numbers[l->count++] = (uint32_t)number;
+    for (int i = 0; i < UMB_PARTS; ++i) {
+        umb_iv_store(tile->mask + i * UMB_LANES, parts[i].mask);
+        umb_fv_store(tile->z + i * UMB_LANES, parts[i].z);
+    }
+}
+
+static inline void put_row(row_sink *sink, row_window *w, size_t row, bool held)
+{
     for (uint32_t n = 0; n < w->count; ++n) {
         uint32_t tx = w->list[n];
         struct umb_row_tile *t = &w->tiles[tx];
@@ -835,21 +859,29 @@ static inline bool merge_row(umb_coverage *c, row_window *w, size_t row, bool he
             parts[i].mask = t->mask[i];
             parts[i].z = held ? umb_fv_max(t->z[i], t->held[i]) : t->z[i];
         }
-        changed |= merge_parts(c, row + tx, parts);
+        if (sink->coverage != NULL) {
+            sink->changed |= merge_parts(sink->coverage, row + tx, parts);
+        } else {
+            append_parts(sink->list, row + tx, parts);
+        }
     }
-    return changed;
 }
 
-static bool fill_mesh(umb_coverage *c, const umb_raster_map *map, umb_silhouette *s, umb_mesh_fill *fill)
+static inline float most_of(const umb_silhouette *s)
+{
+    return (float)(s->most + 0x1p-22 * fabs(s->most));
+}
+
+static void draw_mesh(row_sink *sink, const umb_raster_map *map, umb_silhouette *s, umb_mesh_fill *fill)
 {
     row_window w = {fill->tiles, fill->state, fill->list, 0, fill->tx0, fill->tx1, 0, 0};
     umb_fv far = umb_fv_set(INFINITY);
-    float most = (float)(s->most + 0x1p-22 * fabs(s->most));
+    float most = most_of(s);
     uint32_t edges = UMB_NONE, triangles = UMB_NONE; /* those that this row of tiles meets */
-    bool changed = false, by_plane = fill->plane_count > 0;
+    bool by_plane = fill->plane_count > 0;
     for (uint32_t ty = fill->ty0; ty <= fill->ty1; ++ty) {
         const double *edge = map->rows.edge + (size_t)ty * UMB_TILE_HEIGHT;
-        size_t row = (size_t)ty * c->columns;
+        size_t row = ty * sink->columns;
         w.first = w.tx1 + 1;
         w.last = w.tx0;
         /* The lists of this row join what is still there of those before. */
@@ -867,7 +899,7 @@ static bool fill_mesh(umb_coverage *c, const umb_raster_map *map, umb_silhouette
                 at = &e->next;
             }
         }
-        sweep(c, &w, row, most);
+        sweep(sink->coverage, &w, row, most);
         bool wanted = w.count > 0;
         if (!by_plane) {
             for (uint32_t i = fill->triangles[ty], next; i != UMB_NONE; i = next) {
@@ -896,11 +928,46 @@ static bool fill_mesh(umb_coverage *c, const umb_raster_map *map, umb_silhouette
             lower_row_by_planes(&w, fill, edge);
         }
         if (wanted) {
-            changed |= merge_row(c, &w, row, !by_plane);
+            put_row(sink, &w, row, !by_plane);
         }
+    }
+}
+
+static bool fill_mesh(umb_coverage *c, const umb_raster_map *map, umb_silhouette *s, umb_mesh_fill *fill)
+{
+    row_sink sink = {.coverage = c, .columns = c->columns};
+    draw_mesh(&sink, map, s, fill);
+    return sink.changed;
+}
+
+static bool list_mesh(umb_tile_list *list, const umb_raster_map *map, umb_silhouette *s, umb_mesh_fill *fill)
+{
+    row_sink sink = {.list = list, .columns = (map->width + UMB_TILE_WIDTH - 1) / UMB_TILE_WIDTH};
+    list->count = 0;
+    list->full = false;
+    list->most = most_of(s);
+    draw_mesh(&sink, map, s, fill);
+    return !list->full;
+}
+
+/* Tiles that are closed by what is nearer than all of the occluder would not change. */
+static bool merge_list(umb_coverage *c, const umb_tile_list *list)
+{
+    bool changed = false;
+    for (uint32_t k = 0; k < list->count; ++k) {
+        size_t number = list->numbers[k];
+        if (c->coarse[number] >= list->most) {
+            continue;
+        }
+        tile_part parts[UMB_PARTS];
+        for (int i = 0; i < UMB_PARTS; ++i) {
+            parts[i].mask = umb_iv_load(list->tiles[k].mask + i * UMB_LANES);
+            parts[i].z = umb_fv_load(list->tiles[k].z + i * UMB_LANES);
+        }
+        changed |= merge_parts(c, number, parts);
     }
     return changed;
 }
 
-const umb_raster_kernels KERNELS = {ISA,         hides,       hides_rect,   place,
-                                    find_convex, fill_convex, hides_convex, fill_mesh};
+const umb_raster_kernels KERNELS = {ISA,         hides,        hides_rect, place,     find_convex,
+                                    fill_convex, hides_convex, fill_mesh,  list_mesh, merge_list};
