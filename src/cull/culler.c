@@ -162,7 +162,7 @@ static bool hidden(walk *w, const umb_image *image)
         w->stats.saved += 1;
         return true;
     }
-    umb_asker asker = {w->culler->ops, w->culler->method, &w->map, &w->stats};
+    umb_asker asker = {w->culler->ops, w->culler->method, w->culler->kernels, &w->projector, &w->map, &w->stats};
     bool is = umb_detail_hidden(&asker, image, NULL);
     if (is && propagates) {
         umb_past_hidden(past, image);
@@ -412,7 +412,7 @@ static bool object_shows(walk *w, const umb_object *o, umb_waiting *item)
     if (c->ops == NULL) {
         return true;
     }
-    umb_asker asker = {c->ops, c->method, &w->map, &w->stats};
+    umb_asker asker = {c->ops, c->method, w->culler->kernels, &w->projector, &w->map, &w->stats};
     switch (umb_detail_of(o)) {
     case UMB_DETAIL_NONE:
         return true;

@@ -113,10 +113,36 @@ static bool leaf_shows(const umb_asker *a, const umb_object *o, const umb_part *
     return false;
 }
 
+/* A part in world coordinates is a box like those of nodes, and cheap to place; false if it is too close to the eye
+ * for that. *image has no pixel if nothing of the part is in view. */
+static bool place_part(const umb_asker *a, const umb_aabb *part, umb_image *image)
+{
+    umb_node node;
+    umb_projected p;
+    for (int axis = 0; axis < 3; ++axis) {
+        for (int slot = 0; slot < UMB_NODE_WIDTH; ++slot) {
+            node.min[axis][slot] = part->min[axis];
+            node.max[axis][slot] = part->max[axis];
+        }
+    }
+    a->kernels->project(&node, a->projector, &p);
+    bool away = p.beside != 0 || p.w_max[0] < a->map->least_w || p.w_min[0] > a->map->most_w;
+    *image = (umb_image){{(int16_t)p.x0[0], (int16_t)p.y0[0], (int16_t)p.x1[0], (int16_t)p.y1[0]},
+                         p.nearness[0]};
+    if (away) {
+        image->rect = (umb_pixel_rect){1, 1, 0, 0};
+    }
+    return p.testable != 0 || away;
+}
+
 static bool box_shows(const umb_asker *a, const umb_object *o, uint32_t part)
 {
     if (part == 0 && o->identity) {
         return true; /* the object's bounds */
+    }
+    umb_image image;
+    if (o->identity && place_part(a, &o->mesh->parts[part].box, &image)) {
+        return !umb_detail_hidden(a, &image, NULL);
     }
     umb_image_bounds b;
     switch (umb_image_of_part(a->map, &o->mesh->parts[part].box, &o->transform, o->identity, &b)) {
@@ -124,10 +150,9 @@ static bool box_shows(const umb_asker *a, const umb_object *o, uint32_t part)
         return false;
     case UMB_DEPTH_CROSSING:
         return true;
-    default: {
-        umb_image image = umb_image_of_bounds(a->map, &b);
+    default:
+        image = umb_image_of_bounds(a->map, &b);
         return !umb_detail_hidden(a, &image, NULL);
-    }
     }
 }
 

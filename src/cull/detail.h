@@ -10,6 +10,8 @@
 typedef struct umb_asker {
     const umb_method_ops *ops;
     const void *method;
+    const umb_box_kernels *kernels;
+    const umb_projector *projector; /* the map's */
     const umb_raster_map *map;
     umb_cull_stats *stats;
 } umb_asker;
