@@ -366,7 +366,8 @@ static uint64_t draw_both(drawing *d, const umb_raster_kernels *kernels, const u
     umb_coverage_clear(&d->merged);
     for (uint32_t i = 0; i < 2 * scene->occluder_count; ++i) {
         const umb_occluder *o = &scene->occluders[i * 7u % scene->occluder_count];
-        bool found[2], changed[2] = {false, false};
+        bool found[2];
+        uint32_t changed[2] = {0, 0}; /* tiles */
         for (int way = 0; way < 2; ++way) {
             kernels->place(&d->scratch.silhouette, map, o);
             found[way] = umb_mesh_image_find(&d->scratch, map, o);
