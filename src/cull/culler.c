@@ -308,7 +308,7 @@ static void open_boxes(walk *w, opening *o)
     uint32_t hides = projected.beside & left, sure = 0;
     if (c->past.switches != 0) {
         sure = all_known(&c->past, boxes, left & ~hides);
-        w->stats.saved += (uint32_t)__builtin_popcount(sure & projected.testable);
+        w->stats.saved += w->drawn != 0 ? (uint32_t)__builtin_popcount(sure & projected.testable) : 0;
     }
     if (c->ops != NULL && w->drawn != 0) {
         uint32_t mask = projected.testable & left & ~hides & ~sure;
