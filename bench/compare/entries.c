@@ -3,7 +3,6 @@
 
 #include <stdlib.h>
 
-#include "frustum_walk.h"
 #include "ray_buffer.h"
 #include "zbuffer_tree.h"
 
@@ -29,18 +28,19 @@ static const umbrage_row umbrage_rows[] = {
      {.method = UMB_METHOD_NONE},
      0,
      0},
+    {"umbrage, frustum only, unordered",
+     ENTRY_STILL | ENTRY_SCENE,
+     UMB_INDEX_BVH,
+     {.method = UMB_METHOD_NONE, .unordered = true},
+     0,
+     0},
     {"umbrage, frustum only, flat", ENTRY_STILL, UMB_INDEX_FLAT, {.method = UMB_METHOD_NONE}, 0, 0},
-};
-
-typedef struct frustum_row {
-    const char *name;
-    uint32_t why;
-    umb_index_kind index;
-} frustum_row;
-
-static const frustum_row frustum_rows[] = {
-    {"frustum test, tree", ENTRY_STILL, UMB_INDEX_BVH},
-    {"frustum test, flat", ENTRY_STILL, UMB_INDEX_FLAT},
+    {"umbrage, frustum only, flat, unordered",
+     ENTRY_STILL,
+     UMB_INDEX_FLAT,
+     {.method = UMB_METHOD_NONE, .unordered = true},
+     0,
+     0},
 };
 
 typedef struct zbuffer_row {
@@ -107,16 +107,6 @@ static bool make_umbrage(const world *w, const umbrage_row *row, entry *out)
     }
     u->row = row;
     return umb_culler_create(w->index[row->index], &row->def, &u->culler) == UMB_OK;
-}
-
-static uint32_t frame_of_frustum(void *self, const umb_view *view, const uint32_t **objects)
-{
-    return frustum_walk_frame(self, view, objects);
-}
-
-static void destroy_frustum(void *self)
-{
-    frustum_walk_destroy(self);
 }
 
 static uint32_t frame_of_zbuffer(void *self, const umb_view *view, const uint32_t **objects)
@@ -189,18 +179,6 @@ uint32_t entries_make(const world *w, uint32_t why, entry out[ENTRIES_MOST])
     for (size_t i = 0; ok && i < COUNT(umbrage_rows); ++i) {
         if (umbrage_rows[i].why & why) {
             ok = make_umbrage(w, &umbrage_rows[i], &out[count++]);
-        }
-    }
-    for (size_t i = 0; ok && i < COUNT(frustum_rows); ++i) {
-        if (frustum_rows[i].why & why) {
-            out[count] = (entry){.name = frustum_rows[i].name,
-                                 .about = "frustum",
-                                 .ours = true,
-                                 .frame = frame_of_frustum,
-                                 .destroy = destroy_frustum};
-            out[count].self = frustum_walk_create(w->index[frustum_rows[i].index],
-                                                  w->model->object_count);
-            ok = out[count++].self != NULL;
         }
     }
     for (size_t i = 0; ok && i < COUNT(zbuffer_rows); ++i) {

@@ -66,6 +66,11 @@ typedef struct umb_culler_def {
        times how often their drawing changed anything of late. What score it takes is learned from frame to frame;
        the first frame draws the nearest. 0: no limit. */
     uint32_t occluder_budget;
+    /* Do not put the answer in order: objects come as they are found, the same ones as in order, in an order that
+       depends on the scene, the index and the view alone. What lies below a node wholly inside the frustum is then
+       copied as one range by UMB_METHOD_NONE, without a look at its boxes (unless the view has min_pixels). A
+       replayed capture is in order. */
+    bool unordered;
 } umb_culler_def;
 
 typedef struct umb_cull_stats {
@@ -89,7 +94,7 @@ typedef struct umb_cull_stats {
 /* The answer. Borrowed: valid until the culler's next call. */
 typedef struct umb_visible_set {
     /* Ids, nearest bounds first, ties by id: by least depth along the view's forward, which is levelled where
-       the view names a vertical and looks about along the ground. */
+       the view names a vertical and looks about along the ground. In no such order if the culler is unordered. */
     const uint32_t *objects;
     const uint8_t *inside;   /* beside each id: 1 if its bounds are wholly inside the frustum, else 0 */
     uint32_t count;

@@ -10,6 +10,10 @@
 void umb_sort_keys(uint64_t *keys, uint32_t *values, uint64_t *key_scratch, uint32_t *value_scratch,
                    size_t count);
 
+/* Sort words ascending. scratch holds count elements, too; returns the one of the two that holds the result. In time
+ * proportional to count where the upper halves differ, and never much more. */
+uint64_t *umb_sort_words(uint64_t *words, uint64_t *scratch, size_t count);
+
 /* An unsigned number in the order of the float; -0 and 0 are equal. f is no NaN. */
 static inline uint32_t umb_sort_float(float f)
 {

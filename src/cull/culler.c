@@ -23,6 +23,7 @@
 #include "frustum/box_kernels.h"
 #include "frustum/frustum.h"
 #include "heap.h"
+#include "in_view.h"
 #include "index/tree.h"
 #include "occlusion/image.h"
 #include "occlusion/method.h"
@@ -43,12 +44,14 @@ struct umb_culler {
     const umb_method_ops *ops; /* NULL: no occlusion */
     void *method;
     umb_heap heap;
-    umb_found *found; /* as they are reported */
+    umb_in_view_room room; /* without occlusion, instead of the heap */
+    uint64_t *found;       /* entries of found.h as they are reported */
+    uint64_t *scratch;     /* to sort them */
     uint32_t *objects;
     uint8_t *inside;
     double *rows;    /* the raster's table of rows */
     uint8_t *planes; /* per node: the plane that all its boxes failed last time (plane coherency) */
-    size_t found_capacity, object_capacity, inside_capacity, plane_capacity, row_capacity;
+    size_t found_capacity, scratch_capacity, object_capacity, inside_capacity, plane_capacity, row_capacity;
     umb_past past;
     uint32_t count;
     bool answered;
@@ -120,12 +123,26 @@ void umb_culler_destroy(umb_culler *c)
     }
     umb_heap_free(&c->heap, &a);
     umb_past_free(&c->past, &a);
+    umb_in_view_free(&c->room, &a);
     umb_memory_free(&a, c->found, c->found_capacity * sizeof *c->found);
+    umb_memory_free(&a, c->scratch, c->scratch_capacity * sizeof *c->scratch);
     umb_memory_free(&a, c->objects, c->object_capacity * sizeof *c->objects);
     umb_memory_free(&a, c->inside, c->inside_capacity);
     umb_memory_free(&a, c->planes, c->plane_capacity);
     umb_memory_free(&a, c->rows, c->row_capacity * sizeof *c->rows);
     umb_memory_free(&a, c, sizeof *c);
+}
+
+/* What answers are written to. */
+static bool reserve_answer(umb_culler *c, const umb_tree *tree)
+{
+    const umb_allocator *a = &c->allocator;
+    size_t count = (size_t)tree->object_count + UMB_TREE_SPARE, sorted = c->def.unordered ? 0 : count;
+    return umb_memory_reserve(a, (void **)&c->found, &c->found_capacity, c->ops != NULL ? count : sorted,
+                              sizeof *c->found) &&
+           umb_memory_reserve(a, (void **)&c->scratch, &c->scratch_capacity, sorted, sizeof *c->scratch) &&
+           umb_memory_reserve(a, (void **)&c->objects, &c->object_capacity, count, sizeof *c->objects) &&
+           umb_memory_reserve(a, (void **)&c->inside, &c->inside_capacity, count, 1);
 }
 
 /* Everything that a walk can need, so that it never allocates: each item and node waits at most
@@ -139,13 +156,9 @@ static bool reserve(umb_culler *c, const umb_view *view, const umb_tree *tree, c
     size_t waiting = (size_t)tree->item_count + tree->node_count, early = scene->occluder_count;
     if (!umb_memory_reserve(a, (void **)&c->rows, &c->row_capacity, umb_raster_map_table(height),
                             sizeof *c->rows) ||
-        !umb_heap_reserve(&c->heap, a, waiting > early ? waiting : early) ||
-        !umb_memory_reserve(a, (void **)&c->found, &c->found_capacity, scene->object_count,
-                            sizeof *c->found) ||
-        !umb_memory_reserve(a, (void **)&c->objects, &c->object_capacity, scene->object_count,
-                            sizeof *c->objects) ||
-        !umb_memory_reserve(a, (void **)&c->inside, &c->inside_capacity, scene->object_count, 1) ||
-        !umb_memory_reserve(a, (void **)&c->planes, &c->plane_capacity, tree->node_count, 1)) {
+        (c->ops != NULL && !umb_heap_reserve(&c->heap, a, waiting > early ? waiting : early)) ||
+        (c->ops == NULL && !umb_in_view_reserve(&c->room, a, tree)) || !reserve_answer(c, tree) ||
+        !umb_memory_reserve(a, (void **)&c->planes, &c->plane_capacity, umb_in_view_remembers(tree), 1)) {
         return false;
     }
     if (c->plane_capacity > planes) { /* an empty index has no planes at all */
@@ -308,7 +321,7 @@ static void open_boxes(walk *w, opening *o)
     uint32_t hides = projected.beside & left, sure = 0;
     if (c->past.switches != 0) {
         sure = all_known(&c->past, boxes, left & ~hides);
-        w->stats.saved += w->drawn != 0 ? (uint32_t)__builtin_popcount(sure & projected.testable) : 0;
+        w->stats.saved += (uint32_t)__builtin_popcount(sure & projected.testable);
     }
     if (c->ops != NULL && w->drawn != 0) {
         uint32_t mask = projected.testable & left & ~hides & ~sure;
@@ -371,7 +384,7 @@ static void draw(walk *w, uint32_t occluder, const umb_waiting *item)
     }
     umb_past *past = &w->culler->past;
     if (!umb_past_on(past)) {
-        w->drawn += c->ops->occlude(c->method, occluder, &w->stats) != 0;
+        w->drawn += c->ops->occlude(c->method, occluder, &w->stats);
         return;
     }
     const umb_pixel_rect *rect = item->testable ? &item->image.rect : NULL;
@@ -386,12 +399,9 @@ static void draw(walk *w, uint32_t occluder, const umb_waiting *item)
         w->stats.over_budget += 1;
         break;
     case UMB_PAST_DRAW: {
-        uint32_t before = w->stats.occluders, tiles = c->ops->occlude(c->method, occluder, &w->stats);
-        w->drawn += tiles != 0;
-        umb_past_drew(past, occluder, rect, tiles, !mesh->convex);
-        if (w->stats.occluders == before) {
-            umb_past_refund(past);
-        }
+        bool changed = c->ops->occlude(c->method, occluder, &w->stats);
+        w->drawn += changed;
+        umb_past_drew(past, occluder, rect, changed, !mesh->convex);
     } break;
     }
 }
@@ -399,12 +409,10 @@ static void draw(walk *w, uint32_t occluder, const umb_waiting *item)
 static void report(walk *w, const umb_waiting *item)
 {
     umb_culler *c = w->culler;
-    umb_found *f = &c->found[c->count++];
-    f->key = item->nearest;
-    f->id = item->ref & UMB_REF_NUMBER;
-    f->inside = item->planes == 0;
+    uint32_t id = item->ref & UMB_REF_NUMBER;
+    c->found[c->count++] = umb_found_entry(item->nearest, id, item->planes == 0);
     if (c->past.switches != 0) {
-        umb_past_saw(&c->past, w->tree, f->id, item->node);
+        umb_past_saw(&c->past, w->tree, id, item->node);
     }
 }
 
@@ -590,9 +598,41 @@ static void prepare_walk(walk *w, umb_culler *c, const umb_view *view)
     w->drawn = 0;
     w->stats = (umb_cull_stats){0};
     umb_frustum_prepare(&w->frustum, view);
+    if (c->ops == NULL && c->def.unordered) {
+        return; /* neither pixels nor depths are wanted */
+    }
     umb_raster_map_prepare(&w->map, view, &w->tree->bounds, c->rows);
     prepare_projector(&w->projector, &w->map);
     w->most_w = w->map.most_w < FLT_MAX ? (float)w->map.most_w : INFINITY;
+}
+
+/* Without occlusion. */
+static void find_in_view(walk *w)
+{
+    umb_culler *c = w->culler;
+    umb_in_view v = {.tree = w->tree,
+                     .view = w->view,
+                     .kernels = c->kernels,
+                     .frustum = w->frustum,
+                     .room = &c->room,
+                     .remember = c->planes,
+                     .objects = c->objects,
+                     .inside = c->inside,
+                     .entries = c->def.unordered ? NULL : c->found,
+                     .projector = &w->projector,
+                     .stats = &w->stats};
+    umb_in_view_find(&v);
+    c->count = v.count;
+}
+
+/* The entries found, in order if asked for, as ids and flags. */
+static void write_answer(umb_culler *c)
+{
+    const uint64_t *found = c->def.unordered ? c->found : umb_sort_words(c->found, c->scratch, c->count);
+    for (uint32_t i = 0; i < c->count; ++i) {
+        c->objects[i] = umb_found_id(found[i]);
+        c->inside[i] = umb_found_inside(found[i]);
+    }
 }
 
 umb_result umb_cull(umb_culler *c, const umb_view *view, umb_visible_set *out)
@@ -621,15 +661,17 @@ umb_result umb_cull(umb_culler *c, const umb_view *view, umb_visible_set *out)
     if (!ready) {
         return umb_error_set(c->def.error, UMB_ERROR_MEMORY, "no memory for the frame");
     }
-    umb_heap_clear(&c->heap);
-    run_all(&w);
-    if (umb_past_on(&c->past)) {
-        umb_past_end(&c->past);
+    if (c->ops != NULL) {
+        umb_heap_clear(&c->heap);
+        run_all(&w);
+        if (umb_past_on(&c->past)) {
+            umb_past_end(&c->past);
+        }
+    } else {
+        find_in_view(&w);
     }
-    umb_found_sort(c->found, c->count);
-    for (uint32_t i = 0; i < c->count; ++i) {
-        c->objects[i] = c->found[i].id;
-        c->inside[i] = c->found[i].inside;
+    if (c->ops != NULL || !c->def.unordered) {
+        write_answer(c);
     }
     w.stats.visible = c->count;
     c->view = *view;

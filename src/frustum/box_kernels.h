@@ -45,6 +45,12 @@ typedef struct umb_projector_def {
 
 void umb_projector_prepare(umb_projector *p, const umb_projector_def *def);
 
+/* Where the frustum kernels keep a face of their eight boxes: the lower ones first, eight floats each. */
+static inline uint8_t umb_box_face(int axis, bool upper)
+{
+    return (uint8_t)(((upper ? 3 : 0) + axis) * UMB_NODE_WIDTH);
+}
+
 typedef struct umb_box_kernels {
     umb_isa isa;
     /* umb_frustum_test_node(); *tests becomes the number of planes that all eight boxes were tested

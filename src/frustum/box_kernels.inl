@@ -11,92 +11,106 @@
 
 #define LANES UMB_NODE_WIDTH
 
-/* Clang would unroll these loops before it looks at them as vectors (twice the time of project). */
-#if defined(__clang__)
-#define LANE_LOOP _Pragma("clang loop unroll(disable)")
-#else
-#define LANE_LOOP
-#endif
-
 /* ---- frustum -------------------------------------------------------------------------------- */
 
-/* Faces relative to the eye, and E of frustum.c. */
+/* Faces relative to the eye, in the places of umb_box_face(), and E of frustum.c. */
 typedef struct near_boxes {
-    float low[3][LANES], high[3][LANES];
-    float error[LANES];
+    float face[6 * LANES];
+    umb_fv error[UMB_PARTS];
 } near_boxes;
 
-static inline void approach(const umb_frustum *f, const umb_node *node, near_boxes *b)
+UMB_INLINE void approach(const umb_frustum *f, const umb_node *node, near_boxes *b)
 {
-    for (int i = 0; i < LANES; ++i) {
-        float sum = 0.0f;
+    for (int part = 0; part < UMB_PARTS; ++part) {
+        int at = part * UMB_LANES;
+        umb_fv sum = umb_fv_set(0.0f);
         for (int axis = 0; axis < 3; ++axis) {
-            float low = (node->min[axis][i] - f->eye_high[axis]) - f->eye_low[axis];
-            float high = (node->max[axis][i] - f->eye_high[axis]) - f->eye_low[axis];
-            float a = fabsf(low);
-            float c = fabsf(high);
-            b->low[axis][i] = low;
-            b->high[axis][i] = high;
-            sum += 0x1p-23f * (a > c ? a : c);
+            umb_fv low = (umb_fv_load(node->min[axis] + at) - f->eye_high[axis]) - f->eye_low[axis];
+            umb_fv high = (umb_fv_load(node->max[axis] + at) - f->eye_high[axis]) - f->eye_low[axis];
+            umb_fv_store(b->face + axis * LANES + at, low);
+            umb_fv_store(b->face + (3 + axis) * LANES + at, high);
+            sum += 0x1p-23f * umb_fv_max(umb_fv_abs(low), umb_fv_abs(high));
         }
-        b->error[i] = sum;
+        b->error[part] = sum;
     }
 }
 
-/* Which plane next: the remembered one first, then the lowest. */
-static inline uint32_t first_plane(uint32_t planes, const uint8_t *remember)
+/* G of frustum.c at the corner made of these faces. */
+UMB_INLINE umb_fv plane_at(const near_boxes *b, const umb_frustum_plane *p, const uint8_t faces[3], int part)
 {
-    uint32_t plane = remember != NULL ? *remember : 0;
-    if (plane >= UMB_FRUSTUM_PLANES || (planes >> plane & 1u) == 0) {
-        plane = (uint32_t)__builtin_ctz(planes);
-    }
-    return plane;
+    const float *face = b->face + part * UMB_LANES;
+    umb_fv x = umb_fv_load(face + faces[0]);
+    umb_fv y = umb_fv_load(face + faces[1]);
+    umb_fv z = umb_fv_load(face + faces[2]);
+    return ((p->n[0] * x + p->n[1] * y) + p->n[2] * z) + p->c;
 }
 
+/* A bit for each slot that is outside plane k; outside gathers them. */
+UMB_INLINE uint32_t outside_plane(const umb_frustum *f, const near_boxes *b, uint32_t k, umb_iv outside[UMB_PARTS])
+{
+    const umb_frustum_plane *p = &f->planes[k];
+    uint32_t answer = 0;
+    for (int part = 0; part < UMB_PARTS; ++part) {
+        umb_iv alone = plane_at(b, p, p->farther, part) < -b->error[part] - p->slack;
+        outside[part] |= alone;
+        answer |= umb_iv_bits(alone) << (part * UMB_LANES);
+    }
+    return answer;
+}
+
+typedef uint16_t half_lanes __attribute__((vector_size(2 * UMB_LANES)));
+
+/* The planes that the contents of each slot are still to be tested against. */
+UMB_INLINE void planes_left(const umb_frustum *f, const near_boxes *b, uint32_t planes,
+                            const umb_iv outside[UMB_PARTS], uint16_t left[LANES])
+{
+    for (int part = 0; part < UMB_PARTS; ++part) {
+        umb_iv crossed = umb_iv_set((int32_t)planes);
+        for (uint32_t todo = planes; todo != 0; todo &= todo - 1) {
+            uint32_t k = (uint32_t)__builtin_ctz(todo);
+            const umb_frustum_plane *p = &f->planes[k];
+            umb_iv inside = plane_at(b, p, p->nearer, part) > b->error[part] + p->slack;
+            crossed &= ~(inside & umb_iv_set((int32_t)(1u << k)));
+        }
+        half_lanes narrow = __builtin_convertvector(crossed & ~outside[part], half_lanes);
+        memcpy(left + part * UMB_LANES, &narrow, sizeof(narrow));
+    }
+}
+
+/* Stops early only where all boxes lie outside of one plane, which happens to many nodes in a row or hardly to any.
+ * Boxes that are outside of this plane and that are looked for after the last: a branch after each plane would be
+ * guessed wrong more often than it saved work. */
 static uint32_t cull(const umb_frustum *f, const umb_node *node, uint16_t planes, uint8_t *remember,
                      uint16_t left[LANES], uint32_t *tests)
 {
     near_boxes b;
-    uint32_t inside[LANES] = {0};
-    uint32_t outside[LANES] = {0};
-    uint32_t count = 0;
-    uint32_t missing = LANES;
+    umb_iv outside[UMB_PARTS] = {{0}};
+    uint32_t answer = 0;
+    uint32_t todo = planes;
+    if (remember != NULL && *remember < UMB_FRUSTUM_PLANES && (todo >> *remember & 1u) != 0) {
+        todo = 1u << *remember;
+    }
+    *tests = 0;
     approach(f, node, &b);
-    for (uint32_t todo = planes; todo != 0;) {
-        uint32_t k = first_plane(todo, count == 0 ? remember : NULL);
-        const umb_frustum_plane *p = &f->planes[k];
-        const float *far_x = p->n[0] < 0.0f ? b.low[0] : b.high[0];
-        const float *far_y = p->n[1] < 0.0f ? b.low[1] : b.high[1];
-        const float *far_z = p->n[2] < 0.0f ? b.low[2] : b.high[2];
-        const float *near_x = p->n[0] < 0.0f ? b.high[0] : b.low[0];
-        const float *near_y = p->n[1] < 0.0f ? b.high[1] : b.low[1];
-        const float *near_z = p->n[2] < 0.0f ? b.high[2] : b.low[2];
-        missing = 0;
-        for (int i = 0; i < LANES; ++i) {
-            float far_g = ((p->n[0] * far_x[i] + p->n[1] * far_y[i]) + p->n[2] * far_z[i]) + p->c;
-            float near_g =
-                ((p->n[0] * near_x[i] + p->n[1] * near_y[i]) + p->n[2] * near_z[i]) + p->c;
-            float bound = b.error[i] + p->slack;
-            outside[i] |= (uint32_t)(far_g < -bound);
-            inside[i] |= (uint32_t)(near_g > bound) << k;
-            missing += 1u - outside[i];
-        }
-        todo &= ~(1u << k);
-        ++count;
-        if (missing == 0) {
+    for (uint32_t done = 0; todo != 0; todo = planes & ~done) {
+        uint32_t k = (uint32_t)__builtin_ctz(todo);
+        uint32_t alone = outside_plane(f, &b, k, outside);
+        answer |= alone;
+        done |= 1u << k;
+        *tests += 1;
+        if (alone == 0xFFu) {
             if (remember != NULL) {
                 *remember = (uint8_t)k;
             }
             break;
         }
     }
-    *tests = count;
-    uint32_t answer = 0xFFu << node->count & 0xFFu;
-    for (int i = 0; i < LANES; ++i) {
-        left[i] = (uint16_t)(outside[i] != 0 ? 0u : planes & ~inside[i]);
-        answer |= outside[i] << i;
+    if (answer == 0xFFu) {
+        memset(left, 0, LANES * sizeof(left[0]));
+    } else {
+        planes_left(f, &b, planes, outside, left);
     }
-    return answer;
+    return answer | (0xFFu << node->count & 0xFFu);
 }
 
 /* ---- projection ----------------------------------------------------------------------------- */

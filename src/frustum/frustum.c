@@ -65,6 +65,8 @@ static void add_plane(umb_frustum *f, const umb_view *view, wide_plane p)
     double slack = 3.0 * U * fabs(c) + U * U * eye + ldexp(p.c_error, shift) + 0x1p-118;
     for (int i = 0; i < 3; ++i) {
         out->n[i] = (float)ldexp(n[i], shift);
+        out->farther[i] = umb_box_face(i, !(out->n[i] < 0.0f));
+        out->nearer[i] = umb_box_face(i, out->n[i] < 0.0f);
     }
     out->c = (float)fmax(-C_LARGEST, fmin(C_LARGEST, c));
     /* The factor covers the rounding of slack itself. */

@@ -14,6 +14,9 @@ typedef struct umb_frustum_plane {
     float n[3];
     float c;
     float slack; /* the part of the rounding bound that does not depend on the box */
+    /* Along each axis the face of a box that is farther along n, and the other one, as the box kernels find
+     * them in their list of faces. */
+    uint8_t farther[3], nearer[3];
 } umb_frustum_plane;
 
 typedef struct umb_frustum {
@@ -31,8 +34,8 @@ struct umb_box_kernels;
 /* Test a node's eight boxes against the planes in the mask `planes` (Gummerus 4.2 to 4.4: the
  * corner farthest along a plane's normal and the nearest one, masking, plane coherency).
  *   returns   a bit for each slot that is outside one of these planes, and for each empty slot
- *   remember  this node's own byte, 0 at first: the plane to begin with; becomes the plane at which the
- *             last box was found outside. May be NULL. It never changes the answer
+ *   remember  this node's own byte, 0 at first: the plane to begin with; becomes the plane that all eight
+ *             boxes were outside of. May be NULL. It never changes the answer
  *   left      for each slot the planes that its contents are still to be tested against; 0: wholly
  *             inside all of them (and 0 for slots outside)
  * Safe direction: a box that touches the closed frustum of view.h, in real numbers, is never outside;

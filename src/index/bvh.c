@@ -211,6 +211,49 @@ void umb_bvh_find_places(const umb_node *nodes, uint32_t node_count, uint32_t *p
     }
 }
 
+/* ---- lists of objects ------------------------------------------------------------------------ */
+
+/* How many objects are in each node or below. Children come after their parents. */
+static void count_below(const umb_node *nodes, uint32_t node_count, umb_range *below)
+{
+    for (uint32_t k = node_count; k-- > 0;) {
+        below[k].count = 0;
+        for (uint32_t slot = 0; slot < nodes[k].count; ++slot) {
+            uint32_t ref = nodes[k].ref[slot], kind = ref & UMB_REF_KIND;
+            below[k].count += kind == UMB_REF_NODE ? below[ref & UMB_REF_NUMBER].count : kind == UMB_REF_OBJECT;
+        }
+    }
+}
+
+uint32_t umb_bvh_list_objects(const umb_node *nodes, uint32_t node_count, uint32_t *objects, umb_range *below)
+{
+    uint32_t total = 0;
+    count_below(nodes, node_count, below);
+    for (uint32_t k = 0; k < node_count; ++k) {
+        if (nodes[k].parent == UMB_NONE) {
+            below[k].first = total;
+            total += below[k].count;
+        }
+        uint32_t at = below[k].first;
+        for (uint32_t slot = 0; slot < nodes[k].count; ++slot) {
+            uint32_t number = nodes[k].ref[slot] & UMB_REF_NUMBER;
+            switch (nodes[k].ref[slot] & UMB_REF_KIND) {
+            case UMB_REF_NODE:
+                below[number].first = at;
+                at += below[number].count;
+                break;
+            case UMB_REF_OBJECT:
+                objects[at++] = number;
+                break;
+            default:
+                break;
+            }
+        }
+    }
+    memset(objects + total, 0, UMB_TREE_SPARE * sizeof objects[0]);
+    return total;
+}
+
 /* ---- refitting what moved ------------------------------------------------------------------- */
 
 umb_result umb_bvh_marks_create(umb_bvh_marks *marks, const umb_allocator *a, uint32_t node_count)

@@ -27,6 +27,11 @@ void umb_bvh_refit(umb_node *nodes, uint32_t node_count, const umb_committed *sc
 void umb_bvh_find_places(const umb_node *nodes, uint32_t node_count, uint32_t *places,
                          uint32_t object_count);
 
+/* Lay out the objects in the order of a walk, so that those below each node are side by side. objects has room for
+ * all of them and UMB_TREE_SPARE more, below node_count entries. Nodes without a parent come one after the other.
+ * Returns the number of objects. */
+uint32_t umb_bvh_list_objects(const umb_node *nodes, uint32_t node_count, uint32_t *objects, umb_range *below);
+
 /* A set of node numbers that gives back its highest first: children before their parents. Empty
  * between refits. */
 typedef struct umb_bvh_marks {

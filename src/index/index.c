@@ -8,6 +8,9 @@ struct umb_index {
     umb_node *nodes;  /* what tree.nodes points at */
     uint32_t *places; /* of each object (umb_bvh_find_places) */
     umb_bvh_marks marks;
+    uint32_t *objects; /* what tree.objects, below and blocks point at */
+    umb_range *below;
+    umb_node *blocks;
     umb_scene *scene;
     umb_scene_listener listener;
     umb_allocator allocator;
@@ -84,10 +87,33 @@ static umb_result build_flat(const umb_allocator *a, const umb_bvh_item *items, 
 
 /* ---- following the scene -------------------------------------------------------------------- */
 
-static umb_aabb bounds_of(const umb_node *nodes, uint32_t node_count, bool flat)
+/* The boxes of a flat index's rows. */
+static void fill_blocks(umb_index *index)
+{
+    uint32_t rows = index->tree.node_count;
+    for (uint32_t k = 0; k < index->tree.block_count; ++k) {
+        umb_node *block = &index->blocks[k];
+        uint32_t first = k * UMB_NODE_WIDTH;
+        block->count = rows - first < UMB_NODE_WIDTH ? rows - first : UMB_NODE_WIDTH;
+        block->parent = UMB_NONE;
+        for (uint32_t slot = 0; slot < block->count; ++slot) {
+            umb_aabb b = umb_node_bounds(&index->nodes[first + slot]);
+            for (int i = 0; i < 3; ++i) {
+                block->min[i][slot] = b.min[i];
+                block->max[i][slot] = b.max[i];
+            }
+            block->ref[slot] = UMB_REF_NODE | (first + slot);
+        }
+        umb_node_pad(block);
+    }
+}
+
+/* The box of all items is that of a tree's root, or of a flat index's blocks. */
+static umb_aabb bounds_of(const umb_tree *tree)
 {
     umb_aabb all = {{0, 0, 0}, {0, 0, 0}};
-    uint32_t count = flat ? node_count : node_count < 1 ? 0 : 1;
+    const umb_node *nodes = tree->flat ? tree->blocks : tree->nodes;
+    uint32_t count = tree->flat ? tree->block_count : tree->node_count > 0;
     for (uint32_t k = 0; k < count; ++k) {
         umb_aabb b = umb_node_bounds(&nodes[k]);
         for (int i = 0; i < 3; ++i) {
@@ -98,38 +124,80 @@ static umb_aabb bounds_of(const umb_node *nodes, uint32_t node_count, bool flat)
     return all;
 }
 
+/* What follows from the nodes' boxes. */
+static void settle(umb_index *index)
+{
+    fill_blocks(index);
+    index->tree.bounds = bounds_of(&index->tree);
+    index->tree.version = umb_scene_committed(index->scene)->version;
+}
+
+/* Bytes of what goes with the nodes. */
+typedef struct sizes {
+    size_t nodes, places, objects, below, blocks;
+} sizes;
+
+static sizes sizes_of(const umb_tree *tree, uint32_t object_count)
+{
+    return (sizes){.nodes = tree->node_count * sizeof(umb_node),
+                   .places = object_count * sizeof(uint32_t),
+                   .objects = ((size_t)tree->item_count + UMB_TREE_SPARE) * sizeof(uint32_t),
+                   .below = tree->node_count * sizeof(umb_range),
+                   .blocks = tree->block_count * sizeof(umb_node)};
+}
+
 static void drop(umb_index *index)
 {
-    umb_memory_free(&index->allocator, index->nodes, index->tree.node_count * sizeof(umb_node));
-    umb_memory_free(&index->allocator, index->places,
-                    index->object_count * sizeof(index->places[0]));
-    umb_bvh_marks_free(&index->marks, &index->allocator);
+    const umb_allocator *a = &index->allocator;
+    sizes s = sizes_of(&index->tree, index->object_count);
+    umb_memory_free(a, index->nodes, s.nodes);
+    umb_memory_free(a, index->places, s.places);
+    umb_memory_free(a, index->objects, s.objects);
+    umb_memory_free(a, index->below, s.below);
+    umb_memory_free(a, index->blocks, s.blocks);
+    umb_bvh_marks_free(&index->marks, a);
+}
+
+/* Memory for all that goes with a tree's nodes; the rest of *out is not looked at. */
+static bool furnish(umb_index *out, uint32_t object_count)
+{
+    const umb_allocator *a = &out->allocator;
+    sizes s = sizes_of(&out->tree, object_count);
+    out->places = umb_memory_allocate(a, s.places);
+    out->objects = umb_memory_allocate(a, s.objects);
+    out->below = umb_memory_allocate(a, s.below);
+    out->blocks = umb_memory_allocate_zero(a, s.blocks, 1);
+    out->marks = (umb_bvh_marks){0};
+    return out->places != NULL && out->objects != NULL && out->below != NULL && out->blocks != NULL &&
+           umb_bvh_marks_create(&out->marks, a, out->tree.node_count) == UMB_OK;
 }
 
 /* Take over new nodes, or free them when there is no memory to follow their objects. */
 static umb_result adopt(umb_index *index, const umb_committed *c, umb_node *nodes,
                         uint32_t node_count, uint32_t item_count)
 {
-    const umb_allocator *a = &index->allocator;
-    uint32_t *places = umb_memory_allocate(a, c->object_count * sizeof(places[0]));
-    umb_bvh_marks marks = {0};
-    if (places == NULL || umb_bvh_marks_create(&marks, a, node_count) != UMB_OK) {
-        umb_memory_free(a, places, c->object_count * sizeof(places[0]));
-        umb_memory_free(a, nodes, node_count * sizeof(umb_node));
+    umb_index next = *index;
+    next.nodes = nodes;
+    next.tree.node_count = node_count;
+    next.tree.item_count = item_count;
+    next.tree.block_count =
+        next.tree.flat ? node_count / UMB_NODE_WIDTH + (node_count % UMB_NODE_WIDTH != 0) : 0;
+    next.structure = c->structure;
+    next.object_count = c->object_count;
+    next.first_free_occluder = c->first_free_occluder;
+    next.occluder_count = c->occluder_count;
+    if (!furnish(&next, c->object_count)) {
+        drop(&next);
         return UMB_ERROR_MEMORY;
     }
     drop(index);
-    umb_bvh_find_places(nodes, node_count, places, c->object_count);
-    index->places = places;
-    index->marks = marks;
-    index->nodes = nodes;
-    index->tree.nodes = nodes;
-    index->tree.node_count = node_count;
-    index->tree.item_count = item_count;
-    index->structure = c->structure;
-    index->object_count = c->object_count;
-    index->first_free_occluder = c->first_free_occluder;
-    index->occluder_count = c->occluder_count;
+    umb_bvh_find_places(nodes, node_count, next.places, c->object_count);
+    next.tree.object_count = umb_bvh_list_objects(nodes, node_count, next.objects, next.below);
+    next.tree.nodes = nodes;
+    next.tree.objects = next.objects;
+    next.tree.below = next.below;
+    next.tree.blocks = next.blocks;
+    *index = next;
     return UMB_OK;
 }
 
@@ -191,8 +259,7 @@ static umb_result update(void *user)
             return result;
         }
     }
-    index->tree.bounds = bounds_of(index->nodes, index->tree.node_count, index->tree.flat);
-    index->tree.version = c->version;
+    settle(index);
     return UMB_OK;
 }
 
@@ -317,8 +384,7 @@ static umb_result start_following(umb_index *index, umb_result result, umb_index
         umb_memory_free(&a, index, sizeof(*index));
         return result;
     }
-    index->tree.bounds = bounds_of(index->nodes, index->tree.node_count, index->tree.flat);
-    index->tree.version = umb_scene_committed(index->scene)->version;
+    settle(index);
     index->listener.update = update;
     index->listener.user = index;
     umb_scene_listen(index->scene, &index->listener);
@@ -405,8 +471,8 @@ void umb_index_get_stats(const umb_index *index, umb_index_stats *out)
     out->nodes = tree->node_count;
     out->depth = tree_depth(tree);
     out->cost = tree_cost(tree);
-    out->bytes = sizeof(*index) + tree->node_count * sizeof(umb_node) +
-                 index->object_count * sizeof(index->places[0]) +
+    sizes s = sizes_of(tree, index->object_count);
+    out->bytes = sizeof(*index) + s.nodes + s.places + s.objects + s.below + s.blocks +
                  umb_bvh_marks_memory(&index->marks);
 }
 

@@ -27,11 +27,26 @@ typedef struct umb_node {
     uint32_t pad[5];
 } umb_node;
 
+/* What lies side by side in the list of a tree's objects. */
+typedef struct umb_range {
+    uint32_t first, count;
+} umb_range;
+
+/* So many entries behind the list of objects may be read, too. */
+#define UMB_TREE_SPARE 8
+
 typedef struct umb_tree {
     const umb_node *nodes; /* parents before children; the root is node 0 */
     uint32_t node_count;   /* 0: the index is empty */
     uint32_t item_count;
     bool flat;             /* the nodes are a plain list of rows of eight items, no hierarchy: walk them all */
+    /* The objects, so that those below a node lie side by side; and for each node where. Moves change neither. */
+    const uint32_t *objects;
+    const umb_range *below;
+    uint32_t object_count; /* in the list: the live ones */
+    /* Flat: the boxes of the rows, eight rows to a block, in nodes whose slots refer to rows. */
+    const umb_node *blocks;
+    uint32_t block_count;
     umb_aabb bounds;       /* of all items; zero when empty */
     uint64_t version;      /* of the commit it shows. Behind the scene's only after an update that found no
                               memory: answers would then be wrong, so readers refuse (UMB_ERROR_STATE) */

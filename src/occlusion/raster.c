@@ -121,16 +121,15 @@ static bool hides_body(void *state, uint32_t occluder, const umb_image *image)
 }
 
 /* The same whether a helper has found the image or it is found now. */
-static uint32_t occlude_with_mesh(raster *r, uint32_t occluder, umb_cull_stats *stats)
+static bool occlude_with_mesh(raster *r, uint32_t occluder, umb_cull_stats *stats)
 {
     const umb_ahead_image *image = umb_ahead_take(&r->ahead, occluder);
     uint32_t edge_count;
-    bool drawn;
-    uint32_t changed = 0;
+    bool drawn, changed = false;
     if (image != NULL) {
         drawn = image->drawn;
         edge_count = drawn ? image->edge_count : 0;
-        changed = drawn ? r->kernels->merge_list(&r->coverage, &image->list) : 0;
+        changed = drawn && r->kernels->merge_list(&r->coverage, &image->list);
     } else {
         const umb_occluder *o = &r->scene->occluders[occluder];
         umb_silhouette *s = &r->scratch.silhouette;
@@ -149,7 +148,7 @@ static uint32_t occlude_with_mesh(raster *r, uint32_t occluder, umb_cull_stats *
     return changed;
 }
 
-static uint32_t occlude(void *state, uint32_t occluder, umb_cull_stats *stats)
+static bool occlude(void *state, uint32_t occluder, umb_cull_stats *stats)
 {
     raster *r = state;
     const umb_occluder *o = &r->scene->occluders[occluder];
@@ -161,12 +160,12 @@ static uint32_t occlude(void *state, uint32_t occluder, umb_cull_stats *stats)
     if (found == UMB_CONVEX_OTHER) {
         r->convex_of = UMB_NONE;
         if (!umb_mesh_image_find(&r->scratch, &r->map, o)) {
-            return 0;
+            return false;
         }
         found = umb_convex_of_silhouette(s, &r->map, o, &r->convex);
     }
     if (found == UMB_CONVEX_NOTHING) {
-        return 0;
+        return false;
     }
     stats->occluders += 1;
     if (found == UMB_CONVEX_READY) {

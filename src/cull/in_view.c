@@ -1,0 +1,127 @@
+#include "in_view.h"
+
+#include <string.h>
+
+#include "base/memory.h"
+#include "contribution.h"
+#include "found.h"
+
+/* How many nodes ahead of the walk memory is asked for: enough to wait for several at once, few enough for the first
+ * cache. */
+#define AHEAD 6
+
+bool umb_in_view_reserve(umb_in_view_room *room, const umb_allocator *a, const umb_tree *tree)
+{
+    /* Of a flat index the rows of one block wait at a time. */
+    size_t most = tree->flat ? UMB_NODE_WIDTH : tree->node_count;
+    return umb_memory_reserve(a, (void **)&room->nodes, &room->node_capacity, most, sizeof *room->nodes);
+}
+
+void umb_in_view_free(umb_in_view_room *room, const umb_allocator *a)
+{
+    umb_memory_free(a, room->nodes, room->node_capacity * sizeof *room->nodes);
+    *room = (umb_in_view_room){0};
+}
+
+size_t umb_in_view_remembers(const umb_tree *tree)
+{
+    return (size_t)tree->node_count + tree->block_count;
+}
+
+static void fetch(const umb_tree *tree, uint32_t number)
+{
+    const char *p = (const char *)&tree->nodes[number];
+    for (size_t i = 0; i < sizeof(umb_node); i += 64) {
+        __builtin_prefetch(p + i);
+    }
+}
+
+/* Everything below a node. */
+static void copy_range(umb_in_view *v, uint32_t node)
+{
+    umb_range range = v->tree->below[node];
+    const uint32_t *from = v->tree->objects + range.first;
+    uint32_t *to = v->objects + v->count;
+    uint8_t *inside = v->inside + v->count;
+    for (uint32_t i = 0; i < range.count; i += 8) {
+        memcpy(to + i, from + i, 8 * sizeof *to);
+        memset(inside + i, 1, 8);
+    }
+    v->count += range.count;
+    v->stats->in_frustum += range.count;
+}
+
+static bool too_small(const umb_in_view *v, const umb_node *node, uint32_t slot)
+{
+    umb_aabb box;
+    for (int i = 0; i < 3; ++i) {
+        box.min[i] = node->min[i][slot];
+        box.max[i] = node->max[i][slot];
+    }
+    return umb_contribution_small(v->view, &box);
+}
+
+/* One node or block: what is found is written, nodes below it wait behind the *waiting that do. */
+static void open_node(umb_in_view *v, const umb_node *node, uint16_t planes, uint8_t *remember, uint32_t *waiting)
+{
+    bool sizes = v->view->min_pixels > 0.0, whole = v->entries == NULL && !sizes;
+    uint16_t left[UMB_NODE_WIDTH] = {0};
+    uint32_t in = (1u << node->count) - 1u;
+    v->stats->nodes += 1;
+    if (planes != 0) {
+        v->stats->boxes += node->count;
+        in &= ~umb_frustum_test_node(&v->frustum, v->kernels, node, planes, remember, left);
+    }
+    umb_projected projected;
+    if (v->entries != NULL && in != 0) {
+        v->kernels->project(node, v->projector, &projected);
+    }
+    for (; in != 0; in &= in - 1) {
+        uint32_t slot = (uint32_t)__builtin_ctz(in), ref = node->ref[slot], number = ref & UMB_REF_NUMBER;
+        uint32_t kind = ref & UMB_REF_KIND;
+        if (kind == UMB_REF_NODE && whole && left[slot] == 0) {
+            copy_range(v, number);
+        } else if (sizes && kind != UMB_REF_OCCLUDER && too_small(v, node, slot)) {
+            v->stats->in_frustum += kind == UMB_REF_OBJECT;
+            v->stats->small += kind == UMB_REF_OBJECT;
+        } else if (kind == UMB_REF_NODE) {
+            v->room->nodes[(*waiting)++] = (umb_in_view_node){number, left[slot]};
+        } else if (kind == UMB_REF_OBJECT) {
+            v->stats->in_frustum += 1;
+            if (v->entries != NULL) {
+                v->entries[v->count++] = umb_found_entry(projected.w_min[slot], number, left[slot] == 0);
+            } else {
+                v->inside[v->count] = left[slot] == 0;
+                v->objects[v->count++] = number;
+            }
+        }
+    }
+}
+
+/* Open what waits, first come, first served: nodes are asked for well before their turn. */
+static void drain(umb_in_view *v, uint32_t waiting)
+{
+    for (uint32_t i = 0; i < waiting; ++i) {
+        if (i + AHEAD < waiting) {
+            fetch(v->tree, v->room->nodes[i + AHEAD].number);
+        }
+        umb_in_view_node w = v->room->nodes[i];
+        open_node(v, &v->tree->nodes[w.number], w.planes, &v->remember[w.number], &waiting);
+    }
+}
+
+void umb_in_view_find(umb_in_view *v)
+{
+    const umb_tree *tree = v->tree;
+    v->count = 0;
+    if (tree->flat) {
+        for (uint32_t k = 0; k < tree->block_count; ++k) {
+            uint32_t waiting = 0;
+            open_node(v, &tree->blocks[k], v->frustum.all_planes, &v->remember[tree->node_count + k], &waiting);
+            drain(v, waiting);
+        }
+    } else if (tree->node_count > 0) {
+        v->room->nodes[0] = (umb_in_view_node){0, v->frustum.all_planes};
+        drain(v, 1);
+    }
+}
