@@ -1,5 +1,6 @@
-/* Capture and replay: one frame - scene, settings, what the culler remembers, view, answer - as one
- * little-endian block (docs/capture-format.md). A bug report is a file. */
+/* Capture and replay: one frame - scene, settings, view, answer - as one little-endian block
+ * (docs/capture-format.md). A bug report is a file. What a culler remembers of earlier frames is not in it: an answer
+ * given with coherence switches or an occluder budget (cull.h) need not be the replay's. */
 #ifndef UMBRAGE_CAPTURE_H
 #define UMBRAGE_CAPTURE_H
 

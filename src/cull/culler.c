@@ -321,7 +321,7 @@ static void open_boxes(walk *w, opening *o)
     uint32_t hides = projected.beside & left, sure = 0;
     if (c->past.switches != 0) {
         sure = all_known(&c->past, boxes, left & ~hides);
-        w->stats.saved += (uint32_t)__builtin_popcount(sure & projected.testable);
+        w->stats.saved += w->drawn != 0 ? (uint32_t)__builtin_popcount(sure & projected.testable) : 0;
     }
     if (c->ops != NULL && w->drawn != 0) {
         uint32_t mask = projected.testable & left & ~hides & ~sure;
@@ -384,7 +384,7 @@ static void draw(walk *w, uint32_t occluder, const umb_waiting *item)
     }
     umb_past *past = &w->culler->past;
     if (!umb_past_on(past)) {
-        w->drawn += c->ops->occlude(c->method, occluder, &w->stats);
+        w->drawn += c->ops->occlude(c->method, occluder, &w->stats) != 0;
         return;
     }
     const umb_pixel_rect *rect = item->testable ? &item->image.rect : NULL;
@@ -399,9 +399,12 @@ static void draw(walk *w, uint32_t occluder, const umb_waiting *item)
         w->stats.over_budget += 1;
         break;
     case UMB_PAST_DRAW: {
-        bool changed = c->ops->occlude(c->method, occluder, &w->stats);
-        w->drawn += changed;
-        umb_past_drew(past, occluder, rect, changed, !mesh->convex);
+        uint32_t before = w->stats.occluders, tiles = c->ops->occlude(c->method, occluder, &w->stats);
+        w->drawn += tiles != 0;
+        umb_past_drew(past, occluder, rect, tiles, !mesh->convex);
+        if (w->stats.occluders == before) {
+            umb_past_refund(past);
+        }
     } break;
     }
 }

@@ -37,6 +37,7 @@ static void forget(umb_past *p)
     clear(p->places, p->place_capacity, sizeof *p->places);
     p->early_count = p->next_count = 0;
     p->least_score = 0;
+    p->least_count = p->budget;
     p->frame = FIRST_FRAME;
 }
 
@@ -77,21 +78,23 @@ bool umb_past_begin(umb_past *p, const umb_allocator *a, const umb_tree *tree, c
     p->height = map->height;
     p->next_count = 0;
     p->left = p->budget;
+    p->least_left = p->least_count;
     if (p->budget != 0) {
         memset(p->scores, 0, sizeof p->scores);
     }
     return true;
 }
 
-/* The next frame's least score: as many of this frame's occluders as the budget allows reach it. */
+/* What score it takes in the next frame, if that is like this one: of those with the least, the walk's order decides
+ * which the rest of the budget is for. */
 static void choose_score(umb_past *p)
 {
     uint32_t sum = 0, score = UMB_PAST_SCORES;
     while (score > 0 && sum + p->scores[score - 1] <= p->budget) {
         sum += p->scores[--score];
     }
-    /* The best are too many in one class: the walk's order decides among them. */
-    p->least_score = sum == 0 && score > 0 ? score - 1 : score;
+    p->least_score = score > 0 ? score - 1 : 0;
+    p->least_count = score > 0 ? p->budget - sum : p->budget;
 }
 
 void umb_past_end(umb_past *p)
@@ -174,21 +177,36 @@ umb_past_verdict umb_past_judge(umb_past *p, uint32_t occluder, const umb_pixel_
                                                   : (uint32_t)(rect->x1 - rect->x0 + 1) *
                                                         (uint32_t)(rect->y1 - rect->y0 + 1));
         p->scores[score] += 1;
-        if (score < p->least_score || p->left == 0) {
+        if (p->left == 0 || score < p->least_score || (score == p->least_score && p->least_left == 0)) {
             return UMB_PAST_COSTS;
         }
         p->left -= 1;
+        p->was_least = score == p->least_score;
+        p->least_left -= p->was_least;
     }
     return UMB_PAST_DRAW;
 }
 
-void umb_past_drew(umb_past *p, uint32_t occluder, const umb_pixel_rect *rect, bool changed, bool costly)
+static uint32_t tiles_of(const umb_past *p, const umb_pixel_rect *r)
+{
+    uint32_t x0 = 0, y0 = 0, x1 = p->width - 1, y1 = p->height - 1;
+    if (r != NULL) {
+        x0 = (uint32_t)r->x0;
+        y0 = (uint32_t)r->y0;
+        x1 = (uint32_t)r->x1;
+        y1 = (uint32_t)r->y1;
+    }
+    return (x1 / UMB_TILE_WIDTH - x0 / UMB_TILE_WIDTH + 1) * (y1 / UMB_TILE_HEIGHT - y0 / UMB_TILE_HEIGHT + 1);
+}
+
+void umb_past_drew(umb_past *p, uint32_t occluder, const umb_pixel_rect *rect, uint32_t tiles, bool costly)
 {
     umb_occluder_past *o = &p->occluders[occluder];
+    uint32_t share = 255 * tiles / tiles_of(p, rect);
     o->drawn = p->frame;
     o->rect = rect != NULL ? *rect : (umb_pixel_rect){1, 1, 0, 0};
-    o->worth = (uint8_t)(o->worth - o->worth / 4 + (changed ? 63 : 0));
-    if (changed) {
+    o->worth = (uint8_t)((o->worth + (share < 255 ? share : 255)) / 2);
+    if (tiles != 0) {
         o->idle = 0;
         if (umb_past_has(p, UMB_COHERENCE_LIST)) {
             p->next[p->next_count++] = occluder;
@@ -197,5 +215,13 @@ void umb_past_drew(umb_past *p, uint32_t occluder, const umb_pixel_rect *rect, b
         /* Nothing tells whether one at the eye is still the same sight: it is looked at every other frame. */
         o->rests = p->frame + 1 + (rect != NULL ? 1u << o->idle : 1u);
         o->idle = (uint8_t)(o->idle < UMB_PAST_LONGEST_REST ? o->idle + 1 : o->idle);
+    }
+}
+
+void umb_past_refund(umb_past *p)
+{
+    if (p->budget != 0) {
+        p->left += 1;
+        p->least_left += p->was_least;
     }
 }

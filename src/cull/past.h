@@ -21,7 +21,7 @@ typedef struct umb_occluder_past {
     uint32_t rests;  /* it rests up to and without this frame, as long as its image is much the same */
     umb_pixel_rect rect; /* of its box when it was last drawn; x0 > x1: it had none */
     uint8_t idle;    /* draws on end that changed nothing */
-    uint8_t worth;   /* how often its draws change something lately: 255 always */
+    uint8_t worth;   /* of its image, the part that its latest draws changed: 255 is all */
 } umb_occluder_past;
 
 /* A box found hidden, by the tile of the raster that its middle is in. */
@@ -42,7 +42,10 @@ typedef struct umb_past {
     uint32_t *early, *next;        /* occluders that changed the buffer, last frame and in this one */
     umb_hidden_place *places;      /* per tile */
     uint32_t early_count, next_count, width, height, columns, rows;
-    uint32_t least_score, left;    /* with a budget: what is drawn, and how many more */
+    uint32_t least_score;          /* with a budget: what is drawn, and of the least so many */
+    uint32_t least_left, left;     /* how many more of the least may be drawn in this frame, and of all */
+    uint32_t least_count;
+    bool was_least; /* the last one drawn was of the least score */
     uint32_t scores[UMB_PAST_SCORES]; /* of the occluders that came up in this frame */
     size_t open_capacity, seen_capacity, occluder_capacity, early_capacity, next_capacity;
     size_t place_capacity;
@@ -106,7 +109,9 @@ typedef enum umb_past_verdict {
 
 /* What to do with an occluder that has come up, whose box has this image; NULL: it reaches the eye. */
 umb_past_verdict umb_past_judge(umb_past *p, uint32_t occluder, const umb_pixel_rect *rect);
-/* It was drawn. costly: it may rest when it changes nothing. */
-void umb_past_drew(umb_past *p, uint32_t occluder, const umb_pixel_rect *rect, bool changed, bool costly);
+/* It was drawn, and changed so many tiles. costly: it may rest when it changes nothing. */
+void umb_past_drew(umb_past *p, uint32_t occluder, const umb_pixel_rect *rect, uint32_t tiles, bool costly);
+/* The last one judged to be drawn turned out to face away, or the like: it cost the budget nothing. */
+void umb_past_refund(umb_past *p);
 
 #endif

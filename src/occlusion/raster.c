@@ -121,15 +121,16 @@ static bool hides_body(void *state, uint32_t occluder, const umb_image *image)
 }
 
 /* The same whether a helper has found the image or it is found now. */
-static bool occlude_with_mesh(raster *r, uint32_t occluder, umb_cull_stats *stats)
+static uint32_t occlude_with_mesh(raster *r, uint32_t occluder, umb_cull_stats *stats)
 {
     const umb_ahead_image *image = umb_ahead_take(&r->ahead, occluder);
     uint32_t edge_count;
-    bool drawn, changed = false;
+    bool drawn;
+    uint32_t changed = 0;
     if (image != NULL) {
         drawn = image->drawn;
         edge_count = drawn ? image->edge_count : 0;
-        changed = drawn && r->kernels->merge_list(&r->coverage, &image->list);
+        changed = drawn ? r->kernels->merge_list(&r->coverage, &image->list) : 0;
     } else {
         const umb_occluder *o = &r->scene->occluders[occluder];
         umb_silhouette *s = &r->scratch.silhouette;
@@ -148,7 +149,7 @@ static bool occlude_with_mesh(raster *r, uint32_t occluder, umb_cull_stats *stat
     return changed;
 }
 
-static bool occlude(void *state, uint32_t occluder, umb_cull_stats *stats)
+static uint32_t occlude(void *state, uint32_t occluder, umb_cull_stats *stats)
 {
     raster *r = state;
     const umb_occluder *o = &r->scene->occluders[occluder];
@@ -160,12 +161,12 @@ static bool occlude(void *state, uint32_t occluder, umb_cull_stats *stats)
     if (found == UMB_CONVEX_OTHER) {
         r->convex_of = UMB_NONE;
         if (!umb_mesh_image_find(&r->scratch, &r->map, o)) {
-            return false;
+            return 0;
         }
         found = umb_convex_of_silhouette(s, &r->map, o, &r->convex);
     }
     if (found == UMB_CONVEX_NOTHING) {
-        return false;
+        return 0;
     }
     stats->occluders += 1;
     if (found == UMB_CONVEX_READY) {

@@ -54,18 +54,18 @@ typedef struct umb_raster_kernels {
     /* mesh->convex, at most UMB_CONVEX_TRIANGLES, placed, and no vertex is cut away. */
     umb_convex_result (*find_convex)(const umb_raster_map *map, const umb_occluder *occluder,
                                      const umb_silhouette *s, umb_convex *out);
-    /* Add what a convex occluder covers. True if the buffer changed. */
-    bool (*fill_convex)(umb_coverage *c, const umb_raster_map *map, const umb_convex *convex);
+    /* Add what a convex occluder covers. How many tiles changed. */
+    uint32_t (*fill_convex)(umb_coverage *c, const umb_raster_map *map, const umb_convex *convex);
     /* True if all of the body is hidden, as far as it lies in rect; find_convex made it. */
     bool (*hides_convex)(const umb_coverage *c, const umb_raster_map *map, const umb_convex *convex,
                          umb_pixel_rect rect);
-    /* Add what any occluder covers: its outline and, unless there are planes, its depth triangles are found. True if
-       the buffer changed. */
-    bool (*fill_mesh)(umb_coverage *c, const umb_raster_map *map, umb_silhouette *s, umb_mesh_fill *fill);
+    /* Add what any occluder covers: its outline and, unless there are planes, its depth triangles are found. How
+       many tiles changed. */
+    uint32_t (*fill_mesh)(umb_coverage *c, const umb_raster_map *map, umb_silhouette *s, umb_mesh_fill *fill);
     /* The same in two steps, the buffer's bits being the same too: note what is covered, false if there is no room
        for all of it; and add what was noted. */
     bool (*list_mesh)(umb_tile_list *list, const umb_raster_map *map, umb_silhouette *s, umb_mesh_fill *fill);
-    bool (*merge_list)(umb_coverage *c, const umb_tile_list *list);
+    uint32_t (*merge_list)(umb_coverage *c, const umb_tile_list *list);
 } umb_raster_kernels;
 
 /* The kernels of an instruction set, AUTO for the best; NULL when it is not available. */

@@ -426,11 +426,11 @@ static inline umb_iv span_mask(umb_iv left, umb_iv right, int32_t x)
     return low_bits(to) & ~low_bits(from);
 }
 
-static bool fill_convex(umb_coverage *c, const umb_raster_map *map, const umb_convex *v)
+static uint32_t fill_convex(umb_coverage *c, const umb_raster_map *map, const umb_convex *v)
 {
     row_planes planes;
     spans s;
-    bool changed = false;
+    uint32_t changed = 0;
     uint32_t tx0 = (uint32_t)v->x_min / UMB_TILE_WIDTH;
     uint32_t tx1 = ((uint32_t)v->x_max - 1) / UMB_TILE_WIDTH;
     for (uint32_t ty = v->row0 / UMB_TILE_HEIGHT; ty <= v->row1 / UMB_TILE_HEIGHT; ++ty) {
@@ -465,7 +465,7 @@ static bool fill_convex(umb_coverage *c, const umb_raster_map *map, const umb_co
                 }
                 parts[i].z = z;
             }
-            changed |= merge_parts(c, t, parts);
+            changed += merge_parts(c, t, parts);
         }
     }
     return changed;
@@ -831,7 +831,7 @@ typedef struct row_sink {
     umb_coverage *coverage; /* NULL: into the list */
     umb_tile_list *list;
     size_t columns;
-    bool changed; /* the buffer */
+    uint32_t changed; /* tiles of the buffer */
 } row_sink;
 
 static inline void append_parts(umb_tile_list *l, size_t number, const tile_part parts[UMB_PARTS])
@@ -860,7 +860,7 @@ static inline void put_row(row_sink *sink, row_window *w, size_t row, bool held)
             parts[i].z = held ? umb_fv_max(t->z[i], t->held[i]) : t->z[i];
         }
         if (sink->coverage != NULL) {
-            sink->changed |= merge_parts(sink->coverage, row + tx, parts);
+            sink->changed += merge_parts(sink->coverage, row + tx, parts);
         } else {
             append_parts(sink->list, row + tx, parts);
         }
@@ -933,7 +933,7 @@ static void draw_mesh(row_sink *sink, const umb_raster_map *map, umb_silhouette 
     }
 }
 
-static bool fill_mesh(umb_coverage *c, const umb_raster_map *map, umb_silhouette *s, umb_mesh_fill *fill)
+static uint32_t fill_mesh(umb_coverage *c, const umb_raster_map *map, umb_silhouette *s, umb_mesh_fill *fill)
 {
     row_sink sink = {.coverage = c, .columns = c->columns};
     draw_mesh(&sink, map, s, fill);
@@ -951,9 +951,9 @@ static bool list_mesh(umb_tile_list *list, const umb_raster_map *map, umb_silhou
 }
 
 /* Tiles that are closed by what is nearer than all of the occluder would not change. */
-static bool merge_list(umb_coverage *c, const umb_tile_list *list)
+static uint32_t merge_list(umb_coverage *c, const umb_tile_list *list)
 {
-    bool changed = false;
+    uint32_t changed = 0;
     for (uint32_t k = 0; k < list->count; ++k) {
         size_t number = list->numbers[k];
         if (c->coarse[number] >= list->most) {
@@ -964,7 +964,7 @@ static bool merge_list(umb_coverage *c, const umb_tile_list *list)
             parts[i].mask = umb_iv_load(list->tiles[k].mask + i * UMB_LANES);
             parts[i].z = umb_fv_load(list->tiles[k].z + i * UMB_LANES);
         }
-        changed |= merge_parts(c, number, parts);
+        changed += merge_parts(c, number, parts);
     }
     return changed;
 }

@@ -41,6 +41,15 @@ same "a path without header" spaced bare
 "$umbrage" walk gen:blocks,g=8 --path gen:blocks,g=8 --from 3 --to 20 --every 5 --json |
     jq -c '[.frames[].row]'
 "$umbrage" walk gen:blocks,g=8 --path gen:blocks,g=8 --to 99999 --every 63 --json | jq -c '[.frames[].row]'
+remembered() {
+    "$umbrage" walk gen:blocks,g=8 --path gen:blocks,g=8 --to 9 --json "$@" |
+        jq -c '[.frames[] | .stats + {occluders}] | [([.[].early] | add > 0), ([.[].saved] | add > 0),
+               ([.[].over_budget] | add > 0), ([.[].occluders] | max <= 3)]'
+}
+remembered
+remembered --coherence none
+remembered --coherence list,hierarchy
+remembered --coherence all --occluder-budget 3
 "$umbrage" info gen:city,triangles=5k,seed=3 --json | jq -c '[.objects,.triangles,.bounds]' >seed_key
 "$umbrage" info gen:city,triangles=5k --seed 3 --json | jq -c '[.objects,.triangles,.bounds]' >seed_option
 same "--seed and seed=" seed_key seed_option

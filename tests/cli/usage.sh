@@ -77,6 +77,10 @@ run cull $scene $view --row 3
 run cull $scene $view --path gen:blocks
 run cull $scene $view --from 3
 run cull $scene --path gen:blocks --row 64
+run cull $scene $view --coherence list
+run walk $scene --path gen:blocks --coherence list,,rest
+run walk $scene --path gen:blocks --coherence lists
+run walk $scene --path gen:blocks --occluder-budget 0
 run walk $scene
 run walk $scene --path gen:blocks --from 64
 run walk $scene --path gen:blocks --from 5 --to 4

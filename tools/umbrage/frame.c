@@ -128,6 +128,11 @@ void frame_json(const frame *f, json_text *j)
     json_text_count(j, "hidden_objects", f->stats.hidden_objects);
     json_text_count(j, "edges", f->stats.edges);
     json_text_count(j, "small", f->stats.small);
+    json_text_count(j, "idle", f->stats.idle);
+    json_text_count(j, "early", f->stats.early);
+    json_text_count(j, "saved", f->stats.saved);
+    json_text_count(j, "resting", f->stats.resting);
+    json_text_count(j, "over_budget", f->stats.over_budget);
     json_text_close(j, '}');
     if (f->ids) {
         json_text_ids(j, "ids", f->ids, f->stats.visible);

@@ -266,6 +266,41 @@ static const char *read_isa(options *o, const char *text)
     return "one of auto, scalar, sse4, avx2, neon";
 }
 
+/* Names with commas between them. */
+static const char *read_coherence(options *o, const char *text)
+{
+    static const struct {
+        const char *name;
+        uint32_t bits;
+    } names[] = {{"none", 0},
+                 {"list", UMB_COHERENCE_LIST},
+                 {"hierarchy", UMB_COHERENCE_HIERARCHY},
+                 {"propagation", UMB_COHERENCE_PROPAGATION},
+                 {"conservative", UMB_COHERENCE_CONSERVATIVE},
+                 {"rest", UMB_COHERENCE_REST},
+                 {"all", UMB_COHERENCE_ALL}};
+    for (;;) {
+        size_t length = strcspn(text, ","), i = 0;
+        while (i < sizeof names / sizeof names[0] &&
+               (strlen(names[i].name) != length || memcmp(names[i].name, text, length) != 0)) {
+            ++i;
+        }
+        if (i == sizeof names / sizeof names[0]) {
+            return "none, all, or some of list, hierarchy, propagation, conservative, rest, with commas";
+        }
+        o->coherence |= names[i].bits;
+        if (text[length] == '\0') {
+            return NULL;
+        }
+        text += length + 1;
+    }
+}
+
+static const char *read_budget(options *o, const char *text)
+{
+    return count(text, 1, UINT32_MAX, &o->occluder_budget) ? NULL : "a whole number from 1";
+}
+
 static const char *read_threads(options *o, const char *text)
 {
     return count(text, 1, 256, &o->threads) ? NULL : "a whole number from 1 to 256";
@@ -404,6 +439,9 @@ static const option_spec specs[] = {
     {"method", 0, VIEWS, "NAME", read_method, "raster or none: frustum only (default raster)"},
     {"index", 0, SCENES, "NAME", read_index, "bvh or flat: no hierarchy (default bvh)"},
     {"buffer", 0, VIEWS, "WxH", read_buffer, "the method's own raster (default 1024x288)"},
+    {"coherence", 0, MANY_VIEWS, "NAMES", read_coherence,
+     "carry over: list, hierarchy, propagation, conservative, rest, all (default none)"},
+    {"occluder-budget", 0, MANY_VIEWS, "N", read_budget, "draw at most N occluders a frame (default: all)"},
     {"min-pixels", 0, VIEWS, "P", read_min_pixels,
      "drop objects under P pixels both ways (default 0: none)"},
     {"no-weld", 0, SCENES, NULL, read_flag, "do not join touching objects into common occluders"},

@@ -46,6 +46,7 @@ typedef struct options {
     umb_method method;
     umb_index_kind index;
     umb_isa isa;
+    uint32_t coherence, occluder_budget; /* umb_culler_def */
     uint32_t threads, repeat;
 
     uint32_t grid_width, grid_height;

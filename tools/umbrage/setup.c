@@ -97,7 +97,12 @@ static int setup_cullers(setup *s, const options *o)
     if (code != EXIT_DONE) {
         return code;
     }
-    umb_culler_def def = {.method = o->method, .isa = o->isa, .error = &s->error, .tasks = s->tasks};
+    umb_culler_def def = {.method = o->method,
+                          .isa = o->isa,
+                          .error = &s->error,
+                          .tasks = s->tasks,
+                          .coherence = o->coherence,
+                          .occluder_budget = o->occluder_budget};
     umb_result result = umb_culler_create(s->index, &def, &s->culler);
     def.method = UMB_METHOD_NONE;
     if (result == UMB_OK) {
