@@ -105,6 +105,33 @@ static void test_sort(void **state)
     assert_int_equal(umb_sort_float(0.0f), umb_sort_float(-0.0f));
 }
 
+static int by_word(const void *a, const void *b)
+{
+    uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
+    return (x > y) - (x < y);
+}
+
+/* Few and many, upper halves that differ, that agree in runs, and all alike. */
+static void test_sort_words(void **state)
+{
+    (void)state;
+    enum { MOST = 30000 };
+    static const uint64_t masks[] = {UINT64_MAX, 0x700000FFFFFFFFu, 0xFFFFFFFFu, 0xFF00FF00000000u, 7, 0};
+    static uint64_t words[MOST], scratch[MOST], expected[MOST];
+    for (int round = 0; round < 120; ++round) {
+        size_t n = round < 40 ? (size_t)round * 4 : random_bits() % (round % 2 ? MOST : 9000);
+        for (size_t i = 0; i < n; ++i) {
+            uint64_t high = random_bits();
+            words[i] = expected[i] = (high << 33 ^ random_bits()) & masks[round % 6];
+        }
+        qsort(expected, n, sizeof(expected[0]), by_word);
+        uint64_t *sorted = umb_sort_words(words, scratch, n);
+        assert_true(sorted == words || sorted == scratch);
+        assert_memory_equal(sorted, expected, n * sizeof(expected[0]));
+        assert_ptr_equal(umb_sort_words(sorted, sorted == words ? scratch : words, n), sorted);
+    }
+}
+
 /* The same by integers: coordinates below 2^20 leave every product far inside 64 bits. */
 static int turn_by_integers(const int64_t a[3], const int64_t b[3], const int64_t c[3], int i, int j)
 {
@@ -257,7 +284,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_memory),    cmocka_unit_test(test_error_text),
-        cmocka_unit_test(test_sort),      cmocka_unit_test(test_collinear),
+        cmocka_unit_test(test_sort), cmocka_unit_test(test_sort_words),      cmocka_unit_test(test_collinear),
         cmocka_unit_test(test_transform), cmocka_unit_test(test_pool),
         cmocka_unit_test(test_isa),
     };

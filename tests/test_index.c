@@ -84,6 +84,50 @@ static uint32_t walk(const umb_tree *t, const umb_committed *c, uint32_t node, u
     return nodes;
 }
 
+/* The objects below a node, in the order of a walk, are those of its range, and begin where the walk is. */
+static uint32_t check_ranges(const umb_tree *t, uint32_t node, uint32_t at)
+{
+    const umb_node *n = &t->nodes[node];
+    assert_int_equal(t->below[node].first, at);
+    for (uint32_t s = 0; s < n->count; ++s) {
+        uint32_t number = n->ref[s] & UMB_REF_NUMBER;
+        if ((n->ref[s] & UMB_REF_KIND) == UMB_REF_NODE) {
+            at = check_ranges(t, number, at);
+        } else if ((n->ref[s] & UMB_REF_KIND) == UMB_REF_OBJECT) {
+            assert_true(at < t->object_count);
+            assert_int_equal(t->objects[at++], number);
+        }
+    }
+    assert_int_equal(t->below[node].first + t->below[node].count, at);
+    return at;
+}
+
+/* Each block holds the boxes of the next eight rows. */
+static void check_blocks(const umb_tree *t)
+{
+    uint32_t row = 0;
+    for (uint32_t k = 0; k < t->block_count; ++k) {
+        check_padding(&t->blocks[k]);
+        for (uint32_t s = 0; s < t->blocks[k].count; ++s, ++row) {
+            assert_true(row < t->node_count);
+            assert_int_equal(t->blocks[k].ref[s], UMB_REF_NODE | row);
+            umb_aabb box = slot_box(&t->blocks[k], s), below = umb_node_bounds(&t->nodes[row]);
+            assert_memory_equal(&box, &below, sizeof(box));
+        }
+    }
+    assert_int_equal(row, t->flat ? t->node_count : 0);
+}
+
+static void check_lists(const umb_tree *t)
+{
+    uint32_t at = 0;
+    for (uint32_t k = 0; k < t->node_count; ++k) {
+        at = t->nodes[k].parent == UMB_NONE ? check_ranges(t, k, at) : at;
+    }
+    assert_int_equal(at, t->object_count);
+    check_blocks(t);
+}
+
 static void check_index(const umb_index *index)
 {
     const umb_tree *t = umb_index_tree(index);
@@ -103,6 +147,7 @@ static void check_index(const umb_index *index)
         nodes = walk(t, c, 0, objects, occluders);
     }
     assert_int_equal(nodes, t->node_count);
+    check_lists(t);
     for (uint32_t i = 0; i < c->object_count; ++i) {
         assert_int_equal(objects[i], c->objects[i].live);
         items += objects[i];
@@ -193,6 +238,24 @@ static void add_occluders(umb_scene *scene, uint64_t *seed, uint32_t count)
     }
 }
 
+/* As a capture would: the same nodes from their references alone. */
+static void check_restored(umb_scene *scene, const umb_index_def *def, const umb_index *index)
+{
+    const umb_tree *t = umb_index_tree(index);
+    uint32_t(*refs)[UMB_NODE_WIDTH] = calloc((size_t)t->node_count + 1, sizeof(*refs));
+    umb_index *again;
+    assert_non_null(refs);
+    for (uint32_t k = 0; k < t->node_count; ++k) {
+        memcpy(refs[k], t->nodes[k].ref, sizeof(refs[k]));
+    }
+    assert_int_equal(umb_index_restore(scene, def, (const uint32_t(*)[UMB_NODE_WIDTH])refs, t->node_count, &again),
+                     UMB_OK);
+    check_index(again);
+    assert_memory_equal(umb_index_tree(again)->objects, t->objects, t->object_count * sizeof(t->objects[0]));
+    umb_index_destroy(again);
+    free(refs);
+}
+
 static const uint32_t counts[] = {0, 1, 2, 7, 8, 9, 10, 17, 64, 65, 1000, 9000};
 
 static void test_all_sets(void **state)
@@ -206,6 +269,7 @@ static void test_all_sets(void **state)
                 umb_index *index;
                 assert_int_equal(umb_index_create(scene, &def, &index), UMB_OK);
                 check_index(index);
+                check_restored(scene, &def, index);
                 assert_int_equal(umb_index_get_kind(index), kind);
                 umb_index_destroy(index);
             }
