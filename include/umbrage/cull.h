@@ -53,10 +53,11 @@ typedef struct umb_culler_def {
     umb_error *error;  /* text of failures; may be NULL; must outlive the culler */
     /* Threads that help with one frame; zeroed: none. A call to umb_cull then makes at most one run, of at most 8
        tasks: the walk, and helpers that find ahead of it the images of large occluders which the last frame drew.
-       No task waits for another, so any job system will do, and one busy elsewhere does no harm; the walk may
-       run on any of its threads. Frames with too little to hand over make no run. workers (as in umb_tasks)
-       is a bound here: with 0 or 1 there is no helper, and memory for each helper is kept. Answers, statistics
-       and the buffer are the same to the bit with any tasks and without. */
+       Frames with too little to hand over make no run. The walk may run on any thread of the job system, and
+       waits for a helper some microseconds at most, so threads that are busy elsewhere do no harm. workers (as
+       in umb_tasks) is a bound here: with 0 or 1 there is no helper; each helper keeps memory of its own, 6.4 bytes a
+       pixel of the raster and room for the largest mesh. Answers, statistics and the buffer are the same to the
+       bit with any tasks and without. */
     umb_tasks tasks;
     /* UMB_COHERENCE_... bits. 0: none, an answer depends on the scene and the view alone. With any, and with a
        budget, it depends on the views before, too, and on nothing else: the same frames give the same answers.

@@ -6,7 +6,7 @@
 #define MOST_IMAGES 4096u
 
 /* Tiles of lists that a helper has room for, for each tile of the raster. */
-#define LAYERS 6u
+#define LAYERS 24u
 
 /* Work is counted in vertices placed; an edge of the outline is worth this many. Occluders of less work than
  * LEAST_IMAGE are drawn faster than they are handed over, and frames of less than LEAST_FRAME are over before
@@ -18,6 +18,9 @@
 /* Helpers begin this part of what is left ahead of the walk: it draws that itself meanwhile, and finds ready what
  * comes then. Nearer they would be overtaken, farther they would run out of work before it ends. */
 #define LEAD 4u
+
+/* How often the walk looks at an image that is being found before it finds it itself: some 20 us. */
+#define MOST_LOOKS 512u
 
 void umb_ahead_free(umb_ahead *a, const umb_allocator *allocator)
 {
@@ -102,14 +105,14 @@ uint32_t umb_ahead_begin(umb_ahead *a, const umb_allocator *allocator, const umb
     return a->helper_count;
 }
 
-static bool claim(umb_ahead_image *image)
+/* True if nobody has come before. */
+static bool claim(umb_ahead_image *image, uint32_t state)
 {
     uint32_t expected = UMB_AHEAD_FREE;
-    return atomic_compare_exchange_strong_explicit(&image->state, &expected, UMB_AHEAD_TAKEN, memory_order_relaxed,
+    return atomic_compare_exchange_strong_explicit(&image->state, &expected, state, memory_order_relaxed,
                                                    memory_order_relaxed);
 }
 
-/* What finds no room stays taken. */
 static void find_image(const umb_ahead *a, umb_ahead_helper *h, umb_ahead_image *image)
 {
     const umb_occluder *o = &a->scene->occluders[image->occluder];
@@ -123,6 +126,7 @@ static void find_image(const umb_ahead *a, umb_ahead_helper *h, umb_ahead_image 
         image->edge_count = s->edge_count;
         umb_mesh_image_list(&h->scratch, a->map, o);
         if (!a->kernels->list_mesh(&image->list, a->map, s, &h->scratch.fill)) {
+            atomic_store_explicit(&image->state, UMB_AHEAD_LEFT, memory_order_relaxed);
             return;
         }
         h->used += image->list.count;
@@ -137,7 +141,7 @@ static bool is_over(umb_ahead *a)
 
 static void find_if_free(umb_ahead *a, uint32_t helper, uint32_t i)
 {
-    if (claim(&a->images[i])) {
+    if (claim(&a->images[i], UMB_AHEAD_TAKEN)) {
         find_image(a, &a->helpers[helper], &a->images[i]);
     }
 }
@@ -168,6 +172,19 @@ void umb_ahead_help(umb_ahead *a, uint32_t helper)
     }
 }
 
+/* Half found when its turn comes: most often it is sooner ready than found again. */
+static uint32_t look(const umb_ahead_image *image)
+{
+    uint32_t state = atomic_load_explicit(&image->state, memory_order_acquire);
+    for (uint32_t i = 0; i < MOST_LOOKS && state == UMB_AHEAD_TAKEN; ++i) {
+        for (uint32_t k = 0; k < 32; ++k) {
+            atomic_signal_fence(memory_order_seq_cst);
+        }
+        state = atomic_load_explicit(&image->state, memory_order_acquire);
+    }
+    return state;
+}
+
 const umb_ahead_image *umb_ahead_take(umb_ahead *a, uint32_t occluder)
 {
     umb_ahead_image *image = a->helper_count > 0 ? find(a, occluder) : NULL;
@@ -175,8 +192,7 @@ const umb_ahead_image *umb_ahead_take(umb_ahead *a, uint32_t occluder)
         return NULL;
     }
     atomic_fetch_add_explicit(&a->walk, 1, memory_order_relaxed);
-    bool ready = !claim(image) && atomic_load_explicit(&image->state, memory_order_acquire) == UMB_AHEAD_READY;
-    return ready ? image : NULL;
+    return !claim(image, UMB_AHEAD_LEFT) && look(image) == UMB_AHEAD_READY ? image : NULL;
 }
 
 void umb_ahead_note(umb_ahead *a, uint32_t occluder, uint32_t edge_count)

@@ -6,8 +6,8 @@
  * The walk is serial by nature: what it does next depends on all that it has drawn. But an occluder's image is a
  * function of the view and the occluder alone, and most of the work. Those that the last frame drew, in its order,
  * are a good guess of what this frame draws. An image is the same whoever finds it, and merging it gives the same
- * bits as drawing it; so guesses, threads and timing decide nothing but time. The walk waits for nobody: an
- * image that is only half found when its turn comes is found again. */
+ * bits as drawing it; so guesses, threads and timing decide nothing but time. An image that is half found when its
+ * turn comes is waited for a little; if its thread has been put to sleep, it is found again. */
 #ifndef UMB_AHEAD_H
 #define UMB_AHEAD_H
 
@@ -20,13 +20,18 @@ enum { UMB_AHEAD_HELPERS = 7 };
 /* One guess. */
 typedef struct umb_ahead_image {
     uint32_t occluder;
-    _Atomic uint32_t state; /* UMB_AHEAD_*: whoever turns FREE into something else owns the rest until READY */
+    _Atomic uint32_t state; /* UMB_AHEAD_*: whoever turns FREE into TAKEN owns the rest until READY */
     bool drawn;             /* it covers something, or nearly */
     uint32_t edge_count;
     umb_tile_list list;
 } umb_ahead_image;
 
-enum { UMB_AHEAD_FREE, UMB_AHEAD_TAKEN, UMB_AHEAD_READY };
+enum {
+    UMB_AHEAD_FREE,
+    UMB_AHEAD_TAKEN, /* a helper is at it */
+    UMB_AHEAD_READY,
+    UMB_AHEAD_LEFT /* to the walk: it came first, or there was no room */
+};
 
 typedef struct umb_ahead_helper {
     umb_mesh_scratch scratch;
