@@ -319,7 +319,7 @@ static void open_boxes(walk *w, opening *o)
     umb_projected projected;
     c->kernels->project(boxes, &w->projector, &projected);
     uint32_t hides = projected.beside & left, sure = 0;
-    if (c->past.switches != 0) {
+    if (umb_past_knows(&c->past)) {
         sure = all_known(&c->past, boxes, left & ~hides);
         w->stats.saved += w->drawn != 0 ? (uint32_t)__builtin_popcount(sure & projected.testable) : 0;
     }
@@ -383,12 +383,12 @@ static void draw(walk *w, uint32_t occluder, const umb_waiting *item)
         return;
     }
     umb_past *past = &w->culler->past;
-    if (!umb_past_on(past)) {
+    const umb_mesh *mesh = w->scene->occluders[occluder].mesh;
+    if (!umb_past_judges(past, !mesh->convex)) {
         w->drawn += c->ops->occlude(c->method, occluder, &w->stats) != 0;
         return;
     }
     const umb_pixel_rect *rect = item->testable ? &item->image.rect : NULL;
-    const umb_mesh *mesh = w->scene->occluders[occluder].mesh;
     switch (umb_past_judge(past, occluder, rect)) {
     case UMB_PAST_DONE:
         break;
@@ -414,7 +414,7 @@ static void report(walk *w, const umb_waiting *item)
     umb_culler *c = w->culler;
     uint32_t id = item->ref & UMB_REF_NUMBER;
     c->found[c->count++] = umb_found_entry(item->nearest, id, item->planes == 0);
-    if (c->past.switches != 0) {
+    if (umb_past_knows(&c->past)) {
         umb_past_saw(&c->past, w->tree, id, item->node);
     }
 }
@@ -450,7 +450,7 @@ static bool object_shows(walk *w, const umb_object *o, umb_waiting *item)
 static bool visit_object(walk *w, umb_waiting *item, const umb_heap_entry *entry)
 {
     const umb_object *o = &w->scene->objects[item->ref & UMB_REF_NUMBER];
-    if (w->culler->past.switches != 0 && umb_past_object_seen(&w->culler->past, item->ref & UMB_REF_NUMBER)) {
+    if (umb_past_object_seen(&w->culler->past, item->ref & UMB_REF_NUMBER)) {
         draw(w, o->occluder, item);
         report(w, item);
         return false;
@@ -483,7 +483,7 @@ static bool found_hidden(walk *w, const umb_waiting *item)
     if (!item->testable || item->stamp == w->drawn) {
         return false;
     }
-    if (past->switches != 0 && is_known(past, item->ref)) {
+    if (umb_past_knows(past) && is_known(past, item->ref)) {
         w->stats.saved += 1;
         return false;
     }

@@ -63,9 +63,22 @@ static inline bool umb_past_on(const umb_past *p)
     return p->switches != 0 || p->budget != 0;
 }
 
-static inline bool umb_past_has(const umb_past *p, uint32_t switch_)
+/* Any of them. */
+static inline bool umb_past_has(const umb_past *p, uint32_t switches)
 {
-    return (p->switches & switch_) != 0;
+    return (p->switches & switches) != 0;
+}
+
+/* True if what was seen may answer a question. */
+static inline bool umb_past_knows(const umb_past *p)
+{
+    return umb_past_has(p, UMB_COHERENCE_HIERARCHY | UMB_COHERENCE_CONSERVATIVE);
+}
+
+/* True if occluders are to be judged before they are drawn; costly: that is no convex one. */
+static inline bool umb_past_judges(const umb_past *p, bool costly)
+{
+    return p->budget != 0 || umb_past_has(p, UMB_COHERENCE_LIST) || (costly && umb_past_has(p, UMB_COHERENCE_REST));
 }
 
 /* True if the walk need not ask about a node: something below it was seen in the last frame. */
