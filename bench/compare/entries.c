@@ -12,20 +12,29 @@ typedef struct umbrage_row {
     umb_index_kind index;
     umb_culler_def def;
     uint32_t width, height; /* the raster; 0: the default */
+    uint32_t workers;       /* threads for a frame; 0: one */
 } umbrage_row;
 
 enum { ALL = ENTRY_STILL | ENTRY_MOTION | ENTRY_SCENE, STANDARD_ROW = 0 };
 
 static const umbrage_row umbrage_rows[] = {
-    {"umbrage", ALL, UMB_INDEX_BVH, {.method = UMB_METHOD_RASTER}, 0, 0},
-    {"umbrage 512x288", ENTRY_STILL, UMB_INDEX_BVH, {.method = UMB_METHOD_RASTER}, 512, 288},
-    {"umbrage 1024x576", ENTRY_STILL, UMB_INDEX_BVH, {.method = UMB_METHOD_RASTER}, 1024, 576},
-    {"umbrage 2048x576", ENTRY_STILL, UMB_INDEX_BVH, {.method = UMB_METHOD_RASTER}, 2048, 576},
-    {"umbrage, flat index", ENTRY_STILL, UMB_INDEX_FLAT, {.method = UMB_METHOD_RASTER}, 0, 0},
+    {"umbrage", ALL, UMB_INDEX_BVH, {.method = UMB_METHOD_RASTER}, 0, 0, 0},
+    {"umbrage, 2 threads",
+     ENTRY_MOTION | ENTRY_SCENE,
+     UMB_INDEX_BVH,
+     {.method = UMB_METHOD_RASTER},
+     0,
+     0,
+     2},
+    {"umbrage 512x288", ENTRY_STILL, UMB_INDEX_BVH, {.method = UMB_METHOD_RASTER}, 512, 288, 0},
+    {"umbrage 1024x576", ENTRY_STILL, UMB_INDEX_BVH, {.method = UMB_METHOD_RASTER}, 1024, 576, 0},
+    {"umbrage 2048x576", ENTRY_STILL, UMB_INDEX_BVH, {.method = UMB_METHOD_RASTER}, 2048, 576, 0},
+    {"umbrage, flat index", ENTRY_STILL, UMB_INDEX_FLAT, {.method = UMB_METHOD_RASTER}, 0, 0, 0},
     {"umbrage, frustum only",
      ENTRY_STILL | ENTRY_SCENE,
      UMB_INDEX_BVH,
      {.method = UMB_METHOD_NONE},
+     0,
      0,
      0},
     {"umbrage, frustum only, unordered",
@@ -33,12 +42,14 @@ static const umbrage_row umbrage_rows[] = {
      UMB_INDEX_BVH,
      {.method = UMB_METHOD_NONE, .unordered = true},
      0,
+     0,
      0},
-    {"umbrage, frustum only, flat", ENTRY_STILL, UMB_INDEX_FLAT, {.method = UMB_METHOD_NONE}, 0, 0},
+    {"umbrage, frustum only, flat", ENTRY_STILL, UMB_INDEX_FLAT, {.method = UMB_METHOD_NONE}, 0, 0, 0},
     {"umbrage, frustum only, flat, unordered",
      ENTRY_STILL,
      UMB_INDEX_FLAT,
      {.method = UMB_METHOD_NONE, .unordered = true},
+     0,
      0,
      0},
 };
@@ -68,6 +79,7 @@ static const ray_row ray_rows[] = {
 
 typedef struct umbrage_self {
     umb_culler *culler;
+    umb_pool *pool;
     const umbrage_row *row;
 } umbrage_self;
 
@@ -89,6 +101,7 @@ static void umbrage_destroy(void *self)
 {
     umbrage_self *u = self;
     umb_culler_destroy(u->culler);
+    umb_pool_destroy(u->pool);
     free(u);
 }
 
@@ -105,8 +118,15 @@ static bool make_umbrage(const world *w, const umbrage_row *row, entry *out)
     if (u == NULL) {
         return false;
     }
+    umb_culler_def def = row->def;
     u->row = row;
-    return umb_culler_create(w->index[row->index], &row->def, &u->culler) == UMB_OK;
+    if (row->workers > 1) {
+        if (umb_pool_create(row->workers, &u->pool) != UMB_OK) {
+            return false;
+        }
+        def.tasks = umb_pool_tasks(u->pool);
+    }
+    return umb_culler_create(w->index[row->index], &def, &u->culler) == UMB_OK;
 }
 
 static uint32_t frame_of_zbuffer(void *self, const umb_view *view, const uint32_t **objects)
