@@ -102,20 +102,26 @@ static uint32_t check_ranges(const umb_tree *t, uint32_t node, uint32_t at)
     return at;
 }
 
-/* Each block holds the boxes of the next eight rows. */
+/* Each block holds the boxes of the next eight rows or blocks, and its range is theirs together. */
 static void check_blocks(const umb_tree *t)
 {
-    uint32_t row = 0;
+    uint32_t next = 0;
     for (uint32_t k = 0; k < t->block_count; ++k) {
-        check_padding(&t->blocks[k]);
-        for (uint32_t s = 0; s < t->blocks[k].count; ++s, ++row) {
-            assert_true(row < t->node_count);
-            assert_int_equal(t->blocks[k].ref[s], UMB_REF_NODE | row);
-            umb_aabb box = slot_box(&t->blocks[k], s), below = umb_node_bounds(&t->nodes[row]);
+        const umb_node *block = &t->blocks[k];
+        umb_range range = t->below[t->node_count + k];
+        check_padding(block);
+        for (uint32_t s = 0; s < block->count; ++s, ++next) {
+            assert_true(next < t->node_count + k);
+            assert_int_equal(block->ref[s], UMB_REF_NODE | next);
+            umb_aabb box = slot_box(block, s), below = umb_node_bounds(umb_tree_node(t, next));
             assert_memory_equal(&box, &below, sizeof(box));
+            assert_int_equal(t->below[next].first, range.first);
+            range.first += t->below[next].count;
+            range.count -= t->below[next].count;
         }
+        assert_int_equal(range.count, 0);
     }
-    assert_int_equal(row, t->flat ? t->node_count : 0);
+    assert_int_equal(next, t->flat && t->node_count > 0 ? t->node_count + t->block_count - 1 : 0);
 }
 
 static void check_lists(const umb_tree *t)

@@ -45,7 +45,7 @@ static const umbrage_row umbrage_rows[] = {
      0,
      0},
     {"umbrage, frustum only, flat", ENTRY_STILL, UMB_INDEX_FLAT, {.method = UMB_METHOD_NONE}, 0, 0, 0},
-    {"umbrage, frustum only, flat, unordered",
+    {"umbrage, frustum, flat, unordered",
      ENTRY_STILL,
      UMB_INDEX_FLAT,
      {.method = UMB_METHOD_NONE, .unordered = true},

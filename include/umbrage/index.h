@@ -13,7 +13,9 @@ typedef struct umb_index umb_index;
 
 typedef enum umb_index_kind {
     UMB_INDEX_BVH = 0,  /* bounding volume hierarchy, eight children a node, surface-area splits */
-    UMB_INDEX_FLAT = 1  /* no hierarchy: every box is looked at */
+    UMB_INDEX_FLAT = 1  /* no hierarchy by place: rows of eight boxes in the order of their ids; the
+                            raster method looks at every one, UMB_METHOD_NONE first at boxes around
+                            runs of rows, which help as far as neighbours in the list are near */
 } umb_index_kind;
 
 typedef struct umb_index_def {

@@ -12,8 +12,7 @@
 
 bool umb_in_view_reserve(umb_in_view_room *room, const umb_allocator *a, const umb_tree *tree)
 {
-    /* Of a flat index the rows of one block wait at a time. */
-    size_t most = tree->flat ? UMB_NODE_WIDTH : tree->node_count;
+    size_t most = (size_t)tree->node_count + tree->block_count;
     return umb_memory_reserve(a, (void **)&room->nodes, &room->node_capacity, most, sizeof *room->nodes);
 }
 
@@ -30,7 +29,7 @@ size_t umb_in_view_remembers(const umb_tree *tree)
 
 static void fetch(const umb_tree *tree, uint32_t number)
 {
-    const char *p = (const char *)&tree->nodes[number];
+    const char *p = (const char *)umb_tree_node(tree, number);
     for (size_t i = 0; i < sizeof(umb_node); i += 64) {
         __builtin_prefetch(p + i);
     }
@@ -98,30 +97,22 @@ static void open_node(umb_in_view *v, const umb_node *node, uint16_t planes, uin
     }
 }
 
-/* Open what waits, first come, first served: nodes are asked for well before their turn. */
-static void drain(umb_in_view *v, uint32_t waiting)
-{
-    for (uint32_t i = 0; i < waiting; ++i) {
-        if (i + AHEAD < waiting) {
-            fetch(v->tree, v->room->nodes[i + AHEAD].number);
-        }
-        umb_in_view_node w = v->room->nodes[i];
-        open_node(v, &v->tree->nodes[w.number], w.planes, &v->remember[w.number], &waiting);
-    }
-}
-
+/* From the top, first come, first served: nodes are asked for well before their turn. */
 void umb_in_view_find(umb_in_view *v)
 {
     const umb_tree *tree = v->tree;
+    umb_in_view_node *nodes = v->room->nodes;
+    uint32_t waiting = 0;
     v->count = 0;
-    if (tree->flat) {
-        for (uint32_t k = 0; k < tree->block_count; ++k) {
-            uint32_t waiting = 0;
-            open_node(v, &tree->blocks[k], v->frustum.all_planes, &v->remember[tree->node_count + k], &waiting);
-            drain(v, waiting);
+    if (tree->node_count > 0) {
+        uint32_t top = tree->flat ? tree->node_count + tree->block_count - 1 : 0;
+        nodes[waiting++] = (umb_in_view_node){top, v->frustum.all_planes};
+    }
+    for (uint32_t i = 0; i < waiting; ++i) {
+        if (i + AHEAD < waiting) {
+            fetch(tree, nodes[i + AHEAD].number);
         }
-    } else if (tree->node_count > 0) {
-        v->room->nodes[0] = (umb_in_view_node){0, v->frustum.all_planes};
-        drain(v, 1);
+        uint32_t number = nodes[i].number;
+        open_node(v, umb_tree_node(tree, number), nodes[i].planes, &v->remember[number], &waiting);
     }
 }

@@ -87,41 +87,66 @@ static umb_result build_flat(const umb_allocator *a, const umb_bvh_item *items, 
 
 /* ---- following the scene -------------------------------------------------------------------- */
 
-/* The boxes of a flat index's rows. */
+static uint32_t eighth(uint32_t count)
+{
+    return count / UMB_NODE_WIDTH + (count % UMB_NODE_WIDTH != 0);
+}
+
+/* Rows in blocks of eight, these in blocks of eight, up to one. */
+static uint32_t count_blocks(uint32_t rows)
+{
+    uint32_t total = 0;
+    for (uint32_t level = rows; level > 1 || (level == 1 && total == 0);) {
+        level = eighth(level);
+        total += level;
+    }
+    return total;
+}
+
+/* What the blocks of a flat index refer to, and the objects below them. Levels follow each other, so what is below
+ * the next block comes next, but for the end of a level. */
+static void lay_blocks(umb_node *blocks, umb_range *below, uint32_t rows)
+{
+    uint32_t from = 0, level = rows, number = rows; /* a level's first number and count; the next block's number */
+    while (level > 1 || (level == 1 && from == 0)) {
+        uint32_t end = from + level;
+        for (uint32_t at = from; at < end; ++number) {
+            umb_node *block = &blocks[number - rows];
+            block->parent = UMB_NONE;
+            below[number] = (umb_range){below[at].first, 0};
+            for (; block->count < UMB_NODE_WIDTH && at < end; ++at) {
+                below[number].count += below[at].count;
+                block->ref[block->count++] = UMB_REF_NODE | at;
+            }
+        }
+        from = end;
+        level = eighth(level);
+    }
+}
+
+/* The boxes of the blocks, from those of the rows. */
 static void fill_blocks(umb_index *index)
 {
-    uint32_t rows = index->tree.node_count;
     for (uint32_t k = 0; k < index->tree.block_count; ++k) {
         umb_node *block = &index->blocks[k];
-        uint32_t first = k * UMB_NODE_WIDTH;
-        block->count = rows - first < UMB_NODE_WIDTH ? rows - first : UMB_NODE_WIDTH;
-        block->parent = UMB_NONE;
         for (uint32_t slot = 0; slot < block->count; ++slot) {
-            umb_aabb b = umb_node_bounds(&index->nodes[first + slot]);
+            umb_aabb b = umb_node_bounds(umb_tree_node(&index->tree, block->ref[slot] & UMB_REF_NUMBER));
             for (int i = 0; i < 3; ++i) {
                 block->min[i][slot] = b.min[i];
                 block->max[i][slot] = b.max[i];
             }
-            block->ref[slot] = UMB_REF_NODE | (first + slot);
         }
         umb_node_pad(block);
     }
 }
 
-/* The box of all items is that of a tree's root, or of a flat index's blocks. */
+/* The box of all items is that of the root, or of a flat index's last block. */
 static umb_aabb bounds_of(const umb_tree *tree)
 {
-    umb_aabb all = {{0, 0, 0}, {0, 0, 0}};
-    const umb_node *nodes = tree->flat ? tree->blocks : tree->nodes;
-    uint32_t count = tree->flat ? tree->block_count : tree->node_count > 0;
-    for (uint32_t k = 0; k < count; ++k) {
-        umb_aabb b = umb_node_bounds(&nodes[k]);
-        for (int i = 0; i < 3; ++i) {
-            all.min[i] = k == 0 || b.min[i] < all.min[i] ? b.min[i] : all.min[i];
-            all.max[i] = k == 0 || b.max[i] > all.max[i] ? b.max[i] : all.max[i];
-        }
+    if (tree->node_count == 0) {
+        return (umb_aabb){{0, 0, 0}, {0, 0, 0}};
     }
-    return all;
+    return umb_node_bounds(tree->flat ? &tree->blocks[tree->block_count - 1] : &tree->nodes[0]);
 }
 
 /* What follows from the nodes' boxes. */
@@ -142,7 +167,7 @@ static sizes sizes_of(const umb_tree *tree, uint32_t object_count)
     return (sizes){.nodes = tree->node_count * sizeof(umb_node),
                    .places = object_count * sizeof(uint32_t),
                    .objects = ((size_t)tree->item_count + UMB_TREE_SPARE) * sizeof(uint32_t),
-                   .below = tree->node_count * sizeof(umb_range),
+                   .below = ((size_t)tree->node_count + tree->block_count) * sizeof(umb_range),
                    .blocks = tree->block_count * sizeof(umb_node)};
 }
 
@@ -180,8 +205,7 @@ static umb_result adopt(umb_index *index, const umb_committed *c, umb_node *node
     next.nodes = nodes;
     next.tree.node_count = node_count;
     next.tree.item_count = item_count;
-    next.tree.block_count =
-        next.tree.flat ? node_count / UMB_NODE_WIDTH + (node_count % UMB_NODE_WIDTH != 0) : 0;
+    next.tree.block_count = next.tree.flat ? count_blocks(node_count) : 0;
     next.structure = c->structure;
     next.object_count = c->object_count;
     next.first_free_occluder = c->first_free_occluder;
@@ -193,6 +217,9 @@ static umb_result adopt(umb_index *index, const umb_committed *c, umb_node *node
     drop(index);
     umb_bvh_find_places(nodes, node_count, next.places, c->object_count);
     next.tree.object_count = umb_bvh_list_objects(nodes, node_count, next.objects, next.below);
+    if (next.tree.flat) {
+        lay_blocks(next.blocks, next.below, node_count);
+    }
     next.tree.nodes = nodes;
     next.tree.objects = next.objects;
     next.tree.below = next.below;

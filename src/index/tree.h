@@ -42,15 +42,22 @@ typedef struct umb_tree {
     bool flat;             /* the nodes are a plain list of rows of eight items, no hierarchy: walk them all */
     /* The objects, so that those below a node lie side by side; and for each node where. Moves change neither. */
     const uint32_t *objects;
-    const umb_range *below;
+    const umb_range *below; /* nodes, then blocks */
     uint32_t object_count; /* in the list: the live ones */
-    /* Flat: the boxes of the rows, eight rows to a block, in nodes whose slots refer to rows. */
+    /* Flat: boxes around each eight rows, in blocks like nodes; boxes around each eight of these, and so on to one.
+     * They follow the order of the list, whatever that is. Block k has the number node_count + k, in refs and below. */
     const umb_node *blocks;
-    uint32_t block_count;
+    uint32_t block_count; /* the last one holds all */
     umb_aabb bounds;       /* of all items; zero when empty */
     uint64_t version;      /* of the commit it shows. Behind the scene's only after an update that found no
                               memory: answers would then be wrong, so readers refuse (UMB_ERROR_STATE) */
 } umb_tree;
+
+/* A node or a block. */
+static inline const umb_node *umb_tree_node(const umb_tree *tree, uint32_t number)
+{
+    return number < tree->node_count ? &tree->nodes[number] : &tree->blocks[number - tree->node_count];
+}
 
 const umb_tree *umb_index_tree(const umb_index *index);
 umb_scene *umb_index_scene(const umb_index *index);
