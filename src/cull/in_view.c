@@ -27,7 +27,8 @@ size_t umb_in_view_remembers(const umb_tree *tree)
     return (size_t)tree->node_count + tree->block_count;
 }
 
-static void fetch(const umb_tree *tree, uint32_t number)
+/* Inline: GCC finds that the function has no effect, and drops calls to it. */
+static inline __attribute__((always_inline)) void fetch(const umb_tree *tree, uint32_t number)
 {
     const char *p = (const char *)umb_tree_node(tree, number);
     for (size_t i = 0; i < sizeof(umb_node); i += 64) {
