@@ -110,7 +110,7 @@ static void look_at_scene(const real_scene *scene, strict_count *sums)
     assert_true(camera_path_load(scene->path, &path, &error));
     truth *oracle = truth_create(m, &error);
     assert_non_null(oracle);
-    uint32_t count = small_size() ? 8 : MAX_VIEWS;
+    uint32_t count = MAX_VIEWS;
     for (uint32_t k = 0; k < count; ++k) {
         const double *row = path.rows[k * (scene->nasty_from / count)];
         assert_true(real_scene_view(scene, m, row, false, &views[k]));
