@@ -216,9 +216,53 @@ static void test_far_beside(void **state)
     }
 }
 
+/* A scene so small that nearness is about 10^25: a wall, and in the same shape a plate seen almost edge-on, whose
+ * plane on the raster is steeper than floats can hold. A box before the wall must not be hidden by either. */
+static void test_plane_beyond_floats(void **state)
+{
+    (void)state;
+    const float k = 1e-25f, d = 1e-32f;
+    float p[8][3] = {{-30 * k, -30 * k, -20 * k}, {30 * k, -30 * k, -20 * k}, {30 * k, 30 * k, -20 * k},
+                     {-30 * k, 30 * k, -20 * k},  {d, -k, -4 * k},            {d, k, -4 * k},
+                     {d, k, -4.03f * k},          {d, -k, -4.03f * k}};
+    uint32_t t[12] = {0, 1, 2, 0, 2, 3, 4, 5, 6, 4, 6, 7};
+    uint8_t flags[4] = {UMB_TRIANGLE_TWO_SIDED, UMB_TRIANGLE_TWO_SIDED, UMB_TRIANGLE_TWO_SIDED,
+                        UMB_TRIANGLE_TWO_SIDED};
+    umb_scene *scene = NULL;
+    umb_index *index = NULL;
+    umb_culler *culler = NULL;
+    umb_shape shape;
+    uint32_t id;
+    assert_int_equal(umb_scene_create(&(umb_scene_def){0}, &scene), UMB_OK);
+    umb_shape_def def = {
+        .positions = p[0], .position_count = 8, .indices = t, .index_count = 12, .triangle_flags = flags};
+    assert_int_equal(umb_scene_add_shape(scene, &def, &shape), UMB_OK);
+    umb_object_def wall = {.shape = shape, .flags = UMB_OBJECT_IS_SHAPE};
+    umb_object_def before = {.bounds = {{k, -k, -10 * k}, {2 * k, k, -9 * k}}};
+    umb_object_def behind = {.bounds = {{k, -k, -30 * k}, {2 * k, k, -29 * k}}};
+    assert_int_equal(umb_scene_add_object(scene, &wall, &id), UMB_OK);
+    assert_int_equal(umb_scene_add_object(scene, &before, &id), UMB_OK);
+    assert_int_equal(umb_scene_add_object(scene, &behind, &id), UMB_OK);
+    assert_int_equal(umb_scene_commit(scene), UMB_OK);
+    assert_int_equal(umb_index_create(scene, &(umb_index_def){0}, &index), UMB_OK);
+    assert_int_equal(umb_culler_create(index, NULL, &culler), UMB_OK);
+    const double eye[3] = {0, 0, 0}, target[3] = {0, 0, -1}, up[3] = {0, 1, 0};
+    umb_view view;
+    umb_visible_set seen;
+    assert_int_equal(umb_view_look_at(&view, eye, target, up, 1.0, 2.0, 0.1 * k, 100.0 * k), UMB_OK);
+    assert_int_equal(umb_cull(culler, &view, &seen), UMB_OK);
+    assert_int_equal(seen.stats.occluders, 1);
+    assert_int_equal(seen.count, 2); /* the wall and the box before it; not the one behind */
+    assert_int_equal(seen.objects[1], 1);
+    umb_culler_destroy(culler);
+    umb_index_destroy(index);
+    umb_scene_destroy(scene);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_invariant),
-                                       cmocka_unit_test(test_far_beside)};
+                                       cmocka_unit_test(test_far_beside),
+                                       cmocka_unit_test(test_plane_beyond_floats)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -110,6 +110,7 @@ static void store_plane(const umb_silhouette *s, const umb_raster_map *map, cons
     }
     umb_silhouette_plane every = *p;
     every.low = INFINITY;
+    every.far_corner = s->far_corner; /* what stands in for a plane that floats cannot hold */
     for (uint32_t i = 0; i < s->front_count; ++i) {
         double least, most;
         umb_silhouette_offsets(s, p, o->mesh->triangles[s->front[i]], &least, &most);
