@@ -25,3 +25,13 @@ bool umb_contribution_small(const umb_view *v, const umb_aabb *box)
     return (high[0] - low[0]) * width < v->min_pixels * (v->x_max - v->x_min) &&
            (high[1] - low[1]) * height < v->min_pixels * (v->y_max - v->y_min);
 }
+
+bool umb_contribution_small_slot(const umb_view *view, const umb_node *node, uint32_t slot)
+{
+    umb_aabb box;
+    for (int i = 0; i < 3; ++i) {
+        box.min[i] = node->min[i][slot];
+        box.max[i] = node->max[i][slot];
+    }
+    return umb_contribution_small(view, &box);
+}

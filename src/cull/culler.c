@@ -9,7 +9,8 @@
  *
  * Best-first, not depth-first: an occluder that can hide the nearest point of a box has the smaller
  * key, so it is already in the buffer when the box's turn comes; and when an object is settled, all
- * that can hide any of it are.
+ * that can hide any of it are. Methods that choose their occluders first have a walk without a queue
+ * (chosen.h), and so has frustum culling alone (in_view.h).
  */
 #include "culler.h"
 
@@ -17,6 +18,7 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "chosen.h"
 #include "contribution.h"
 #include "detail.h"
 #include "found.h"
@@ -45,6 +47,7 @@ struct umb_culler {
     void *method;
     umb_heap heap;
     umb_in_view_room room; /* without occlusion, instead of the heap */
+    umb_chosen_room chosen_room; /* with a method that chooses first, likewise */
     uint64_t *found;       /* entries of found.h as they are reported */
     uint64_t *scratch;     /* to sort them */
     uint32_t *objects;
@@ -73,6 +76,12 @@ typedef struct walk {
     umb_cull_stats stats;
 } walk;
 
+/* True if the method chooses its occluders before the walk. */
+static bool chooses(const umb_culler *c)
+{
+    return c->ops != NULL && c->ops->choose != NULL;
+}
+
 umb_result umb_culler_create(const umb_index *index, const umb_culler_def *def, umb_culler **out)
 {
     static const umb_culler_def zero = {0};
@@ -83,7 +92,7 @@ umb_result umb_culler_create(const umb_index *index, const umb_culler_def *def, 
         return umb_error_set(def->error, UMB_ERROR_ARGUMENT,
                              "instruction set %s is not available here", umb_isa_name(def->isa));
     }
-    if (def->method != UMB_METHOD_RASTER && def->method != UMB_METHOD_NONE) {
+    if (def->method != UMB_METHOD_NONE && umb_method_get(def->method) == NULL) {
         return umb_error_set(def->error, UMB_ERROR_ARGUMENT, "unknown method %d", (int)def->method);
     }
     if ((def->coherence & ~(uint32_t)UMB_COHERENCE_ALL) != 0) {
@@ -100,7 +109,7 @@ umb_result umb_culler_create(const umb_index *index, const umb_culler_def *def, 
     c->def = *def;
     c->kernels = kernels;
     c->ops = umb_method_get(def->method);
-    if (c->ops != NULL) { /* without occlusion there is nothing to learn */
+    if (c->ops != NULL && !chooses(c)) { /* without occlusion there is nothing to learn */
         c->past.switches = def->coherence;
         c->past.budget = def->occluder_budget;
     }
@@ -124,6 +133,7 @@ void umb_culler_destroy(umb_culler *c)
     umb_heap_free(&c->heap, &a);
     umb_past_free(&c->past, &a);
     umb_in_view_free(&c->room, &a);
+    umb_chosen_free(&c->chosen_room, &a);
     umb_memory_free(&a, c->found, c->found_capacity * sizeof *c->found);
     umb_memory_free(&a, c->scratch, c->scratch_capacity * sizeof *c->scratch);
     umb_memory_free(&a, c->objects, c->object_capacity * sizeof *c->objects);
@@ -156,7 +166,8 @@ static bool reserve(umb_culler *c, const umb_view *view, const umb_tree *tree, c
     size_t waiting = (size_t)tree->item_count + tree->node_count, early = scene->occluder_count;
     if (!umb_memory_reserve(a, (void **)&c->rows, &c->row_capacity, umb_raster_map_table(height),
                             sizeof *c->rows) ||
-        (c->ops != NULL && !umb_heap_reserve(&c->heap, a, waiting > early ? waiting : early)) ||
+        (c->ops != NULL && !chooses(c) && !umb_heap_reserve(&c->heap, a, waiting > early ? waiting : early)) ||
+        (chooses(c) && !umb_chosen_reserve(&c->chosen_room, a, tree)) ||
         (c->ops == NULL && !umb_in_view_reserve(&c->room, a, tree)) || !reserve_answer(c, tree) ||
         !umb_memory_reserve(a, (void **)&c->planes, &c->plane_capacity, umb_in_view_remembers(tree), 1)) {
         return false;
@@ -196,12 +207,7 @@ static bool too_small(walk *w, const umb_node *node, uint32_t slot)
     if (!(w->view->min_pixels > 0.0) || kind == UMB_REF_OCCLUDER) {
         return false;
     }
-    umb_aabb box;
-    for (int i = 0; i < 3; ++i) {
-        box.min[i] = node->min[i][slot];
-        box.max[i] = node->max[i][slot];
-    }
-    bool small = umb_contribution_small(w->view, &box);
+    bool small = umb_contribution_small_slot(w->view, node, slot);
     w->stats.small += small && kind == UMB_REF_OBJECT;
     return small;
 }
@@ -629,6 +635,48 @@ static void find_in_view(walk *w)
     c->count = v.count;
 }
 
+static umb_viewer viewer_of(const umb_view *v)
+{
+    bool parallel = v->projection == UMB_ORTHOGRAPHIC;
+    umb_viewer viewer = {.points = parallel ? &v->forward : &v->eye,
+                         .point_count = 1,
+                         .parallel = parallel,
+                         .cut = true,
+                         .near_depth = v->near_depth};
+    memcpy(viewer.from, v->eye, sizeof viewer.from);
+    memcpy(viewer.forward, v->forward, sizeof viewer.forward);
+    return viewer;
+}
+
+/* With a method that chooses its occluders first. */
+static umb_result find_chosen(walk *w)
+{
+    umb_culler *c = w->culler;
+    umb_choice choice = {.viewer = viewer_of(w->view),
+                         .view = w->view,
+                         .frustum = &w->frustum,
+                         .scene = w->scene,
+                         .tree = w->tree,
+                         .budget = c->def.occluder_budget,
+                         .coherence = c->def.coherence,
+                         .stats = &w->stats};
+    umb_result result = c->ops->choose(c->method, &choice);
+    if (result != UMB_OK) {
+        return result;
+    }
+    umb_chosen chosen = {.choice = &choice,
+                         .ops = c->ops,
+                         .method = c->method,
+                         .kernels = c->kernels,
+                         .projector = &w->projector,
+                         .room = &c->chosen_room,
+                         .remember = c->planes,
+                         .entries = c->found};
+    umb_chosen_find(&chosen);
+    c->count = chosen.count;
+    return UMB_OK;
+}
+
 /* The entries found, in order if asked for, as ids and flags. */
 static void write_answer(umb_culler *c)
 {
@@ -658,20 +706,20 @@ umb_result umb_cull(umb_culler *c, const umb_view *view, umb_visible_set *out)
     bool ready = reserve(c, view, w.tree, w.scene);
     if (ready) {
         prepare_walk(&w, c, view);
-        ready = c->ops == NULL || c->ops->prepare(c->method, &w.map, w.scene) == UMB_OK;
+        ready = c->ops == NULL || (chooses(c) ? find_chosen(&w) : c->ops->prepare(c->method, &w.map, w.scene)) == UMB_OK;
         ready = ready && (!umb_past_on(&c->past) ||
                           umb_past_begin(&c->past, &c->allocator, w.tree, w.scene, &w.map));
     }
     if (!ready) {
         return umb_error_set(c->def.error, UMB_ERROR_MEMORY, "no memory for the frame");
     }
-    if (c->ops != NULL) {
+    if (c->ops != NULL && !chooses(c)) {
         umb_heap_clear(&c->heap);
         run_all(&w);
         if (umb_past_on(&c->past)) {
             umb_past_end(&c->past);
         }
-    } else {
+    } else if (c->ops == NULL) {
         find_in_view(&w);
     }
     if (c->ops != NULL || !c->def.unordered) {
@@ -715,7 +763,7 @@ bool umb_culler_read_buffer(const umb_culler *c, float *pixels, size_t capacity,
                             uint32_t *height)
 {
     *width = *height = 0;
-    if (c->ops == NULL || !c->answered) {
+    if (c->ops == NULL || c->ops->buffer == NULL || !c->answered) {
         return false;
     }
     const umb_coverage *b = c->ops->buffer(c->method);
@@ -744,7 +792,7 @@ const umb_index *umb_culler_index(const umb_culler *culler)
 
 const umb_coverage *umb_culler_coverage(const umb_culler *culler)
 {
-    return culler->ops != NULL && culler->answered ? culler->ops->buffer(culler->method) : NULL;
+    return culler->ops != NULL && culler->ops->buffer != NULL && culler->answered ? culler->ops->buffer(culler->method) : NULL;
 }
 
 umb_culler_def umb_culler_settings(const umb_culler *culler)

@@ -51,16 +51,6 @@ static void copy_range(umb_in_view *v, uint32_t node)
     v->stats->in_frustum += range.count;
 }
 
-static bool too_small(const umb_in_view *v, const umb_node *node, uint32_t slot)
-{
-    umb_aabb box;
-    for (int i = 0; i < 3; ++i) {
-        box.min[i] = node->min[i][slot];
-        box.max[i] = node->max[i][slot];
-    }
-    return umb_contribution_small(v->view, &box);
-}
-
 /* One node or block: what is found is written, nodes below it wait behind the *waiting that do. */
 static void open_node(umb_in_view *v, const umb_node *node, uint16_t planes, uint8_t *remember, uint32_t *waiting)
 {
@@ -81,7 +71,7 @@ static void open_node(umb_in_view *v, const umb_node *node, uint16_t planes, uin
         uint32_t kind = ref & UMB_REF_KIND;
         if (kind == UMB_REF_NODE && whole && left[slot] == 0) {
             copy_range(v, number);
-        } else if (sizes && kind != UMB_REF_OCCLUDER && too_small(v, node, slot)) {
+        } else if (sizes && kind != UMB_REF_OCCLUDER && umb_contribution_small_slot(v->view, node, slot)) {
             v->stats->in_frustum += kind == UMB_REF_OBJECT;
             v->stats->small += kind == UMB_REF_OBJECT;
         } else if (kind == UMB_REF_NODE) {

@@ -1,4 +1,6 @@
-/* The one interface of occlusion methods. A culler drives a method through a frame:
+/* The one interface of occlusion methods. A culler drives a method through a frame, in one of two ways.
+ *
+ * Methods that take occluders as the walk reaches them (the raster; best-first, culler.c):
  *
  *   prepare      the view and the committed scene; forget last frame's occluders
  *   hides        ask about a node's boxes; const, so that batches may be asked from several threads
@@ -6,8 +8,16 @@
  *   occlude      add one occluder that the walk has reached
  *   look_ahead, help, finish: what other threads can do meanwhile
  *
- * Questions carry the box's image on the raster, which the walk computes for its order anyway. That
- * something is hidden is a promise; anything else is none.
+ * Their questions carry the box's image on the raster, which that walk computes for its order anyway.
+ *
+ * Methods that choose their occluders first (depth-first, cull/chosen.c):
+ *
+ *   choose         the viewer, the committed scene and the index: choose the occluders of the frame
+ *   ask            about a node's boxes, with the token that the answer about the node gave; answers hand
+ *                  a token to each child: what is left to ask below it
+ *   hides_object   about one object in more detail than its box
+ *
+ * That something is hidden is a promise; anything else is none.
  */
 #ifndef UMB_METHOD_H
 #define UMB_METHOD_H
@@ -25,12 +35,59 @@ typedef struct umb_image {
     float nearness;      /* of its nearest point, rounded towards the eye */
 } umb_image;
 
+/* Who looks: from one point, along one direction, or from anywhere in a convex cell. */
+typedef struct umb_viewer {
+    const double (*points)[3]; /* the corners of the cell; one: the eye. Parallel: one, the direction that all
+                                  sight-lines run in */
+    uint32_t point_count;
+    bool parallel;
+    bool cut;                  /* what is nearer than the near plane hides nothing */
+    double from[3], forward[3], near_depth; /* then, what is not nearer: forward . (p - from) >= near_depth */
+} umb_viewer;
+
+/* A frame for a method that chooses its occluders first. All of it lasts until the walk has ended. */
+typedef struct umb_choice {
+    umb_viewer viewer;
+    const umb_view *view;
+    const umb_frustum *frustum; /* of the view */
+    const umb_committed *scene;
+    const umb_tree *tree;
+    uint32_t budget;    /* how many occluders to choose; 0: the method's default */
+    uint32_t coherence; /* UMB_COHERENCE_... */
+    umb_cull_stats *stats;
+} umb_choice;
+
+/* What an answer says about what is below: nothing of it is or will be hidden, it need not be asked about. */
+#define UMB_TOKEN_CLEAR UMB_NONE
+/* What the boxes of the root are asked with. */
+#define UMB_TOKEN_ALL 0u
+
+/* A question about the boxes of one node, and its answer. Questions come depth first: once a token is asked with,
+ * those that were given out after it, for boxes of other nodes, are not used any more. */
+typedef struct umb_query {
+    const umb_node *boxes;
+    uint32_t node;  /* the number of the node */
+    uint32_t mask;  /* which boxes are asked about */
+    uint32_t token; /* of the node; never UMB_TOKEN_CLEAR, then nothing is asked */
+    uint32_t hidden; /* answer: a bit for each box that is hidden */
+    uint32_t tokens[UMB_NODE_WIDTH]; /* answer: for each box asked about that is not hidden */
+} umb_query;
+
+/* Members that only one kind of method has are NULL for the other; what is marked optional may be NULL. */
 typedef struct umb_method_ops {
     const char *name;
     umb_class class_;
     /* isa is one that is available. */
     umb_result (*create)(const umb_allocator *allocator, umb_isa isa, void **state);
     void (*destroy)(void *state);
+
+    /* ---- methods that choose first ---- */
+    umb_result (*choose)(void *state, const umb_choice *choice);
+    void (*ask)(void *state, umb_query *query);
+    /* True if the object, whose box is not hidden, is. token: that of its box. Optional. */
+    bool (*hides_object)(void *state, uint32_t object, uint32_t token);
+
+    /* ---- methods that take occluders as they come ---- */
     umb_result (*prepare)(void *state, const umb_raster_map *map, const umb_committed *scene);
     /* A bit for each box of mask that is hidden; all of them are testable and not beside the raster. */
     uint32_t (*hides)(const void *state, const umb_projected *boxes, uint32_t mask);

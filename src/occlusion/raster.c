@@ -200,6 +200,18 @@ static const umb_coverage *buffer(const void *state)
 }
 
 const umb_method_ops umb_raster_method = {
-    "raster",   UMB_CLASS_STRICT, create, destroy, prepare,    hides, hidden,
-    hides_body, open_at,          occlude, buffer, look_ahead, help,  finish,
+    .name = "raster",
+    .class_ = UMB_CLASS_STRICT,
+    .create = create,
+    .destroy = destroy,
+    .prepare = prepare,
+    .hides = hides,
+    .hidden = hidden,
+    .hides_body = hides_body,
+    .open_at = open_at,
+    .occlude = occlude,
+    .buffer = buffer,
+    .look_ahead = look_ahead,
+    .help = help,
+    .finish = finish,
 };
