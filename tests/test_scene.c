@@ -125,7 +125,10 @@ static void test_commit_shows_changes(void **state)
     assert_int_equal(umb_scene_remove_occluder(scene, o), UMB_OK);
     assert_int_equal(umb_scene_commit(scene), UMB_OK);
     assert_int_equal(umb_scene_occluder_count(scene), 0);
-    assert_true(c->structure > structure && c->moved_count == 0);
+    assert_true(c->structure == structure + 1 && c->came_count == 0);
+    assert_true(c->moved_count == 1 && c->moved[0] == a); /* other flags */
+    assert_true(c->went_count == 1 && c->went[0] == b);
+    assert_int_equal(c->replaced_count, 2);
     assert_true(c->objects[a].live && !c->objects[b].live && c->objects[b].used);
     assert_true(umb_scene_object_bounds(scene, b, &box));
     assert_true(umb_scene_bounds(scene, &box) && box.max[0] == 0.0f);
@@ -319,9 +322,9 @@ static void test_random_changes(void **state)
             }
             assert_true(o->bounds.min[0] == model[id].x && o->transform.m[0][3] == model[id].x);
             if (o->live && model[id].hides) {
-                assert_int_equal(o->occluder, owned);
-                assert_int_equal(c->occluders[owned].owner, id);
-                assert_true(c->occluders[owned].bounds.min[0] == model[id].x);
+                assert_true(o->occluder < c->first_free_occluder);
+                assert_int_equal(c->occluders[o->occluder].owner, id);
+                assert_true(c->occluders[o->occluder].bounds.min[0] == model[id].x);
                 owned += 1;
             } else {
                 assert_int_equal(o->occluder, UMB_NONE);

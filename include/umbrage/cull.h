@@ -27,7 +27,8 @@ typedef enum umb_class {
 /* What a culler may carry over from one frame to the next (Gummerus 3.7, 5.2), as bits. Each is safe alone and with
  * any others: an occluder may be drawn at any time, a node opened or an object reported without asking, and
  * nothing is ever hidden but by a test of this frame. They pay, if at all, for one viewer that moves in small steps.
- * What is remembered is dropped when objects or occluders come or go. */
+ * What is remembered of objects and occluders that come or go is dropped; more than one such commit between two frames
+ * drops all. */
 typedef enum umb_coherence {
     /* What changed the buffer in the last frame is drawn first, nearest first, before anything is asked (Greene's
        temporal coherence list). */

@@ -57,23 +57,69 @@ static bool reserve_places(umb_past *p, const umb_allocator *a, const umb_raster
     return true;
 }
 
+/* An occluder of which nothing is known. */
+static const umb_occluder_past new_occluder = {.worth = 255};
+
+/* Room for what is new, and nothing known of it. */
+static bool extend(umb_past *p, const umb_allocator *a, const umb_tree *tree, const umb_committed *scene)
+{
+    size_t open = p->open_capacity, seen = p->seen_capacity, occluders = p->occluder_capacity;
+    if (!reserve(p, a, tree, scene)) {
+        return false;
+    }
+    clear(p->open + open, p->open_capacity - open, sizeof *p->open);
+    clear(p->seen + seen, p->seen_capacity - seen, sizeof *p->seen);
+    for (; occluders < p->occluder_capacity; ++occluders) {
+        p->occluders[occluders] = new_occluder;
+    }
+    return true;
+}
+
+/* The structure has grown once since the last frame: what is told of numbers that mean another thing now is dropped.
+ * Nodes need no care: one that was open before is opened untested once more. */
+static void follow(umb_past *p, const umb_committed *scene)
+{
+    for (uint32_t i = 0; i < scene->came_count && p->seen_capacity > 0; ++i) {
+        p->seen[scene->came[i]] = 0;
+    }
+    for (uint32_t i = 0; i < scene->replaced_count; ++i) {
+        if (scene->replaced[i] < p->occluder_capacity) {
+            p->occluders[scene->replaced[i]] = new_occluder;
+        }
+    }
+    uint32_t kept = 0;
+    for (uint32_t i = 0; i < p->early_count; ++i) {
+        uint32_t occluder = p->early[i];
+        if (occluder < scene->occluder_count && p->occluders[occluder].drawn != 0) {
+            p->early[kept++] = occluder;
+        }
+    }
+    p->early_count = kept;
+}
+
 bool umb_past_begin(umb_past *p, const umb_allocator *a, const umb_tree *tree, const umb_committed *scene,
                     const umb_raster_map *map)
 {
-    bool same = p->frame != 0 && p->frame != UINT32_MAX && p->structure == scene->structure &&
-                p->node_count == tree->node_count;
+    bool known = p->frame != 0 && p->frame != UINT32_MAX, same = p->structure == scene->structure;
     if (!reserve_places(p, a, map)) {
         return false;
     }
-    if (!same) {
+    if (!known || (!same && p->structure + 1 != scene->structure)) {
         p->frame = 0;
         if (!reserve(p, a, tree, scene)) {
             return false;
         }
         forget(p);
-        p->structure = scene->structure;
-        p->node_count = tree->node_count;
+    } else {
+        if (!extend(p, a, tree, scene)) {
+            p->frame = 0;
+            return false;
+        }
+        if (!same) {
+            follow(p, scene);
+        }
     }
+    p->structure = scene->structure;
     p->width = map->width;
     p->height = map->height;
     p->next_count = 0;

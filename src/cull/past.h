@@ -1,7 +1,8 @@
 /* What a culler remembers of earlier frames (Gummerus 3.7 and 5.2), each part only when the switch that uses it is
  * on. Nothing in it hides anything: what it says is only what need not be asked, and what may be left undrawn.
  *
- * Everything is known by the number of a frame, by node and occluder number, for one structure of the scene. Answers
+ * Everything is known by the number of a frame, by node, object and occluder number. When things come and go between
+ * two frames, it follows the scene's change lists; when more has changed than they tell, all is forgotten. Answers
  * that could not be completed leave no trace. */
 #ifndef UMB_PAST_H
 #define UMB_PAST_H
@@ -35,7 +36,6 @@ typedef struct umb_past {
     uint32_t budget;   /* 0: none */
     uint32_t frame;    /* of the walk that is going on; 0: nothing is known */
     uint64_t structure;
-    uint32_t node_count;
     uint32_t *open; /* per node: the frame in which something below it was last reported */
     uint32_t *seen; /* per object: the frame in which it was last reported */
     umb_occluder_past *occluders;

@@ -23,9 +23,15 @@ static bool reserve_silhouette(umb_mesh_scratch *s, const umb_allocator *a, cons
     if (s->structure == scene->structure + 1) {
         return true;
     }
+    /* Known but for the last change: what that put in place is looked at alone. */
+    bool known = s->structure != 0 && s->structure == scene->structure;
     uint32_t vertices = 0, triangles = 0, edges = 0;
-    for (uint32_t i = 0; i < scene->occluder_count; ++i) {
-        const umb_mesh *m = scene->occluders[i].mesh;
+    for (uint32_t i = 0, n = known ? scene->replaced_count : scene->occluder_count; i < n; ++i) {
+        uint32_t number = known ? scene->replaced[i] : i;
+        if (number >= scene->occluder_count) {
+            continue;
+        }
+        const umb_mesh *m = scene->occluders[number].mesh;
         vertices = m->block_position_count > vertices ? m->block_position_count : vertices;
         triangles = m->triangle_count > triangles ? m->triangle_count : triangles;
         edges = m->edge_count > edges ? m->edge_count : edges;

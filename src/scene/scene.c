@@ -89,13 +89,20 @@ void umb_scene_destroy(umb_scene *scene)
     umb_memory_free(&a, scene->objects, scene->object_capacity * sizeof *scene->objects);
     umb_memory_free(&a, scene->occluders, scene->occluder_capacity * sizeof *scene->occluders);
     umb_memory_free(&a, scene->groups, scene->group_capacity * sizeof *scene->groups);
-    umb_memory_free(&a, scene->moved, scene->moved_capacity * sizeof *scene->moved);
+    umb_memory_free(&a, scene->touched, scene->touched_capacity * sizeof *scene->touched);
+    umb_memory_free(&a, scene->touched_occluders,
+                    scene->touched_occluder_capacity * sizeof *scene->touched_occluders);
+    umb_memory_free(&a, scene->sources, scene->source_capacity * sizeof *scene->sources);
     umb_memory_free(&a, scene->committed_objects,
                     scene->committed_object_capacity * sizeof *scene->committed_objects);
     umb_memory_free(&a, scene->committed_occluders,
                     scene->committed_occluder_capacity * sizeof *scene->committed_occluders);
     umb_memory_free(&a, scene->committed_moved,
                     scene->committed_moved_capacity * sizeof *scene->committed_moved);
+    umb_memory_free(&a, scene->committed_came, scene->committed_came_capacity * sizeof *scene->committed_came);
+    umb_memory_free(&a, scene->committed_went, scene->committed_went_capacity * sizeof *scene->committed_went);
+    umb_memory_free(&a, scene->committed_replaced,
+                    scene->committed_replaced_capacity * sizeof *scene->committed_replaced);
     umb_memory_free(&a, scene, sizeof *scene);
 }
 
@@ -257,15 +264,33 @@ umb_result umb_scene_add_object(umb_scene *scene, const umb_object_def *def, uin
     if (!umb_ids_reserve(&scene->object_ids, &scene->allocator) ||
         !umb_memory_reserve(&scene->allocator, (void **)&scene->objects, &scene->object_capacity,
                             need, sizeof *scene->objects) ||
-        !umb_memory_reserve(&scene->allocator, (void **)&scene->moved, &scene->moved_capacity, need,
-                            sizeof *scene->moved)) {
+        !umb_memory_reserve(&scene->allocator, (void **)&scene->touched, &scene->touched_capacity, need,
+                            sizeof *scene->touched)) {
         return fail_memory(scene, "an object");
     }
     (void)umb_ids_take(&scene->object_ids);
     scene->objects[id] = slot;
+    umb_scene_touch_object(scene, id);
     scene->structure_changed = true;
     *out = id;
     return UMB_OK;
+}
+
+void umb_scene_touch_object(umb_scene *scene, uint32_t object)
+{
+    if (!scene->objects[object].touched) {
+        scene->objects[object].touched = true;
+        scene->touched[scene->touched_count++] = object;
+    }
+}
+
+static void touch_occluder(umb_scene *scene, uint32_t occluder)
+{
+    if (!scene->occluders[occluder].touched) {
+        scene->occluders[occluder].touched = true;
+        scene->touched_occluders[scene->touched_occluder_count++] = occluder;
+    }
+    scene->structure_changed = true;
 }
 
 static umb_object_slot *find_object(umb_scene *scene, uint32_t object)
@@ -300,10 +325,7 @@ umb_result umb_scene_move_object(umb_scene *scene, uint32_t object, const umb_tr
     umb_weld_dissolve(scene, slot->weld);
     place(&slot->placement, transform, &seen);
     slot->bounds = *box;
-    if (!slot->moved) {
-        slot->moved = true;
-        scene->moved[scene->moved_count++] = object;
-    }
+    umb_scene_touch_object(scene, object);
     return UMB_OK;
 }
 
@@ -318,6 +340,7 @@ umb_result umb_scene_flag_object(umb_scene *scene, uint32_t object, uint32_t fla
     }
     umb_weld_dissolve(scene, slot->weld);
     slot->flags = flags;
+    umb_scene_touch_object(scene, object);
     scene->structure_changed = true;
     return UMB_OK;
 }
@@ -331,6 +354,7 @@ umb_result umb_scene_remove_object(umb_scene *scene, uint32_t object)
     umb_weld_dissolve(scene, slot->weld);
     slot->state = UMB_SLOT_REMOVED;
     umb_ids_release(&scene->object_ids, object);
+    umb_scene_touch_object(scene, object);
     scene->structure_changed = true;
     return UMB_OK;
 }
@@ -342,7 +366,7 @@ umb_result umb_scene_add_occluder(umb_scene *scene, umb_shape shape, const umb_t
         return umb_scene_fail(scene, UMB_ERROR_ARGUMENT, "nowhere to put the occluder's number");
     }
     *out = UMB_NONE;
-    umb_occluder_slot slot = {.placement.shape = shape, .state = UMB_SLOT_USED};
+    umb_occluder_slot slot = {.placement.shape = shape, .number = UMB_NONE, .state = UMB_SLOT_USED};
     outcome seen;
     umb_result result = look(scene, shape, transform, &seen);
     if (result != UMB_OK) {
@@ -360,12 +384,15 @@ umb_result umb_scene_add_occluder(umb_scene *scene, umb_shape shape, const umb_t
     }
     if (!umb_ids_reserve(&scene->occluder_ids, &scene->allocator) ||
         !umb_memory_reserve(&scene->allocator, (void **)&scene->occluders, &scene->occluder_capacity,
-                            (size_t)scene->occluder_ids.used + 1, sizeof *scene->occluders)) {
+                            (size_t)scene->occluder_ids.used + 1, sizeof *scene->occluders) ||
+        !umb_memory_reserve(&scene->allocator, (void **)&scene->touched_occluders,
+                            &scene->touched_occluder_capacity, (size_t)scene->occluder_ids.used + 1,
+                            sizeof *scene->touched_occluders)) {
         return fail_memory(scene, "an occluder");
     }
     (void)umb_ids_take(&scene->occluder_ids);
     scene->occluders[id] = slot;
-    scene->structure_changed = true;
+    touch_occluder(scene, id);
     *out = id;
     return UMB_OK;
 }
@@ -377,7 +404,7 @@ umb_result umb_scene_remove_occluder(umb_scene *scene, uint32_t occluder)
     }
     scene->occluders[occluder].state = UMB_SLOT_REMOVED;
     umb_ids_release(&scene->occluder_ids, occluder);
-    scene->structure_changed = true;
+    touch_occluder(scene, occluder);
     return UMB_OK;
 }
 
@@ -404,7 +431,11 @@ size_t umb_scene_memory(const umb_scene *scene)
     bytes += scene->object_capacity * sizeof *scene->objects;
     bytes += scene->occluder_capacity * sizeof *scene->occluders;
     bytes += scene->group_capacity * sizeof *scene->groups;
-    bytes += (scene->moved_capacity + scene->committed_moved_capacity) * sizeof *scene->moved;
+    bytes += (scene->touched_capacity + scene->touched_occluder_capacity + scene->committed_moved_capacity +
+              scene->committed_came_capacity + scene->committed_went_capacity +
+              scene->committed_replaced_capacity) *
+             sizeof *scene->touched;
+    bytes += scene->source_capacity * sizeof *scene->sources;
     bytes += scene->committed_object_capacity * sizeof *scene->committed_objects;
     bytes += scene->committed_occluder_capacity * sizeof *scene->committed_occluders;
     for (uint32_t i = 0; i < scene->shape_count; ++i) {

@@ -29,13 +29,18 @@ typedef struct umb_object {
 
 typedef struct umb_committed {
     const umb_object *objects;
-    const umb_occluder *occluders; /* owned ones first, by owner; then stand-alone ones */
+    const umb_occluder *occluders; /* owned ones first, then stand-alone ones; numbers may change with structure */
     uint32_t object_count, occluder_count;
     uint32_t first_free_occluder;  /* occluders from here on have no owner */
-    uint64_t version;              /* grows with every commit that changed something */
-    uint64_t structure;            /* grows when items came or went, not when boxes moved */
-    const uint32_t *moved;         /* objects that this version moved; none when structure grew */
+    uint64_t version;              /* grows by one with every commit that changed something */
+    uint64_t structure;            /* grows by one when items came or went or changed flags, not when boxes moved */
+    /* The change lists, each entry once. A reader that knows the version before this one needs no more to follow. */
+    const uint32_t *moved;         /* live objects that this version gave another place or flags */
     uint32_t moved_count;
+    /* What the last growth of structure changed; a reader that knows the structure before follows by these. */
+    const uint32_t *came, *went;   /* objects that are live now and were not; that were and are no more */
+    const uint32_t *replaced;      /* occluder numbers, used before or now, that hold another occluder or none */
+    uint32_t came_count, went_count, replaced_count;
 } umb_committed;
 
 const umb_committed *umb_scene_committed(const umb_scene *scene);

@@ -1,6 +1,8 @@
 /* Commits: the changed state becomes the one that readers see. */
 #include "scene_state.h"
 
+#define MOST_OCCLUDERS (1u << 30)
+
 static bool owns_occluder(const umb_scene *scene, const umb_object_slot *slot)
 {
     return slot->weld == UMB_NONE && umb_scene_object_hides(scene, slot);
@@ -42,101 +44,187 @@ static umb_object make_object(const umb_scene *scene, const umb_object_slot *slo
     return o;
 }
 
-static uint64_t count_occluders(const umb_scene *scene)
+/* ---- memory --------------------------------------------------------------------------------- */
+
+/* How many occluders a commit may add. */
+static uint64_t count_new_occluders(const umb_scene *scene)
 {
-    uint64_t count = 0;
-    for (uint32_t i = 0; i < scene->object_ids.used; ++i) {
-        count += owns_occluder(scene, &scene->objects[i]) ? 1 : 0;
-    }
-    for (uint32_t i = 0; i < scene->group_count; ++i) {
-        count += scene->groups[i] != NULL ? scene->groups[i]->mesh_count : 0;
-    }
-    for (uint32_t i = 0; i < scene->occluder_ids.used; ++i) {
-        count += scene->occluders[i].state == UMB_SLOT_USED ? 1 : 0;
+    uint64_t count = (uint64_t)scene->touched_count + scene->touched_occluder_count;
+    for (uint32_t i = 0; scene->groups_changed && i < scene->group_count; ++i) {
+        const umb_weld_group *g = scene->groups[i];
+        count += g != NULL && !g->committed ? g->mesh_count : 0;
     }
     return count;
 }
 
-static void fill_objects(umb_scene *scene)
+static bool reserve(umb_scene *scene, size_t occluders)
+{
+    const umb_allocator *a = &scene->allocator;
+    size_t objects = scene->object_ids.used, known = scene->source_capacity;
+    bool ready =
+        umb_memory_reserve(a, (void **)&scene->committed_objects, &scene->committed_object_capacity, objects,
+                           sizeof *scene->committed_objects) &&
+        umb_memory_reserve(a, (void **)&scene->committed_occluders, &scene->committed_occluder_capacity, occluders,
+                           sizeof *scene->committed_occluders) &&
+        umb_memory_reserve(a, (void **)&scene->sources, &scene->source_capacity, occluders, sizeof *scene->sources) &&
+        umb_memory_reserve(a, (void **)&scene->committed_replaced, &scene->committed_replaced_capacity, occluders,
+                           sizeof *scene->committed_replaced) &&
+        umb_memory_reserve(a, (void **)&scene->committed_moved, &scene->committed_moved_capacity, objects,
+                           sizeof *scene->committed_moved) &&
+        umb_memory_reserve(a, (void **)&scene->committed_came, &scene->committed_came_capacity, scene->touched_count,
+                           sizeof *scene->committed_came) &&
+        umb_memory_reserve(a, (void **)&scene->committed_went, &scene->committed_went_capacity, scene->touched_count,
+                           sizeof *scene->committed_went);
+    for (; known < scene->source_capacity; ++known) {
+        scene->sources[known].replaced = false;
+    }
+    return ready;
+}
+
+/* Where readers find the arrays. */
+static void show(umb_scene *scene)
 {
     umb_committed *c = &scene->committed;
-    c->object_count = scene->object_ids.used;
-    c->occluder_count = 0;
-    for (uint32_t i = 0; i < c->object_count; ++i) {
-        umb_object_slot *slot = &scene->objects[i];
-        uint32_t occluder = UMB_NONE;
-        if (owns_occluder(scene, slot)) {
-            occluder = c->occluder_count++;
-            scene->committed_occluders[occluder] = make_occluder(scene, &slot->placement, i);
+    c->objects = scene->committed_objects;
+    c->occluders = scene->committed_occluders;
+    c->moved = scene->committed_moved;
+    c->came = scene->committed_came;
+    c->went = scene->committed_went;
+    c->replaced = scene->committed_replaced;
+}
+
+/* ---- changes -------------------------------------------------------------------------------- */
+
+static void forget_replaced(umb_scene *scene)
+{
+    umb_committed *c = &scene->committed;
+    for (uint32_t i = 0; i < c->replaced_count; ++i) {
+        scene->sources[scene->committed_replaced[i]].replaced = false;
+    }
+    c->replaced_count = c->came_count = c->went_count = 0;
+}
+
+/* Numbers of objects that the readers have not seen yet. */
+static void extend_objects(umb_scene *scene)
+{
+    umb_committed *c = &scene->committed;
+    for (; c->object_count < scene->object_ids.used; ++c->object_count) {
+        scene->committed_objects[c->object_count] = (umb_object){.occluder = UMB_NONE};
+    }
+}
+
+static void remove_occluders(umb_scene *scene)
+{
+    for (uint32_t i = 0; i < scene->touched_count; ++i) {
+        uint32_t id = scene->touched[i], occluder = scene->committed_objects[id].occluder;
+        if (occluder != UMB_NONE && !owns_occluder(scene, &scene->objects[id])) {
+            umb_occluders_remove(scene, occluder);
         }
-        scene->committed_objects[i] = make_object(scene, slot, occluder);
-        slot->moved = false;
-        if (slot->state == UMB_SLOT_REMOVED) {
+    }
+    for (const umb_weld_group *g = scene->retired; g != NULL; g = g->next) {
+        for (uint32_t k = 0; g->committed && k < g->mesh_count; ++k) {
+            umb_occluders_remove(scene, g->numbers[k]);
+        }
+    }
+    for (uint32_t i = 0; i < scene->touched_occluder_count; ++i) {
+        umb_occluder_slot *slot = &scene->occluders[scene->touched_occluders[i]];
+        if (slot->state != UMB_SLOT_USED) {
+            if (slot->number != UMB_NONE) {
+                umb_occluders_remove(scene, slot->number);
+            }
             slot->state = UMB_SLOT_FREE;
         }
     }
-    c->first_free_occluder = c->occluder_count;
 }
 
-static void fill_stand_alone(umb_scene *scene)
+static void add_stand_alone(umb_scene *scene)
 {
-    umb_committed *c = &scene->committed;
-    for (uint32_t i = 0; i < scene->group_count; ++i) {
-        const umb_weld_group *g = scene->groups[i];
-        for (uint32_t k = 0; g != NULL && k < g->mesh_count; ++k) {
-            scene->committed_occluders[c->occluder_count++] = make_welded(g->meshes[k]);
+    for (uint32_t i = 0; scene->groups_changed && i < scene->group_count; ++i) {
+        umb_weld_group *g = scene->groups[i];
+        for (uint32_t k = 0; g != NULL && !g->committed && k < g->mesh_count; ++k) {
+            umb_occluder welded = make_welded(g->meshes[k]);
+            umb_occluders_add_free(scene, &welded, g, k);
+        }
+        if (g != NULL) {
+            g->committed = true;
         }
     }
-    for (uint32_t i = 0; i < scene->occluder_ids.used; ++i) {
-        umb_occluder_slot *slot = &scene->occluders[i];
-        if (slot->state == UMB_SLOT_USED) {
-            scene->committed_occluders[c->occluder_count++] = make_occluder(scene, &slot->placement,
-                                                                            UMB_NONE);
+    for (uint32_t i = 0; i < scene->touched_occluder_count; ++i) {
+        uint32_t id = scene->touched_occluders[i];
+        umb_occluder_slot *slot = &scene->occluders[id];
+        if (slot->state == UMB_SLOT_USED && slot->number == UMB_NONE) {
+            umb_occluder made = make_occluder(scene, &slot->placement, UMB_NONE);
+            umb_occluders_add_free(scene, &made, NULL, id);
+        }
+        slot->touched = false;
+    }
+    scene->touched_occluder_count = 0;
+    scene->groups_changed = false;
+}
+
+/* Write a touched object anew, and the occluder that it owns; note whether it came, went or stayed. */
+static void commit_object(umb_scene *scene, uint32_t id)
+{
+    umb_committed *c = &scene->committed;
+    umb_object_slot *slot = &scene->objects[id];
+    bool was_live = scene->committed_objects[id].live;
+    uint32_t occluder = scene->committed_objects[id].occluder;
+    scene->committed_objects[id] = make_object(scene, slot, occluder);
+    if (owns_occluder(scene, slot)) {
+        umb_occluder owned = make_occluder(scene, &slot->placement, id);
+        if (occluder == UMB_NONE) {
+            umb_occluders_add_owned(scene, &owned);
         } else {
-            slot->state = UMB_SLOT_FREE;
+            scene->committed_occluders[occluder] = owned;
         }
     }
+    bool live = scene->committed_objects[id].live;
+    if (live && was_live) {
+        scene->committed_moved[c->moved_count++] = id;
+    } else if (live) {
+        scene->committed_came[c->came_count++] = id;
+    } else if (was_live) {
+        scene->committed_went[c->went_count++] = id;
+    }
+    slot->touched = false;
+    slot->state = slot->state == UMB_SLOT_REMOVED ? UMB_SLOT_FREE : slot->state;
 }
 
-/* Write everything anew. Memory is made sure of first: after that nothing can fail, so readers
- * never see half a commit. */
+/* What has been touched is written anew, nothing else is looked at. Memory is made sure of first: after that nothing
+ * can fail, so readers never see half a commit. */
 static umb_result commit_structure(umb_scene *scene)
 {
-    uint64_t occluders = count_occluders(scene);
-    if (occluders > (1u << 30)) {
+    uint64_t occluders = scene->committed.occluder_count + count_new_occluders(scene);
+    bool ready = occluders <= MOST_OCCLUDERS && reserve(scene, (size_t)occluders);
+    show(scene); /* reserving may have moved an array: readers keep a valid one */
+    if (occluders > MOST_OCCLUDERS) {
         return umb_scene_fail(scene, UMB_ERROR_LIMIT, "more than 2^30 occluders");
     }
-    if (!umb_memory_reserve(&scene->allocator, (void **)&scene->committed_objects,
-                            &scene->committed_object_capacity, scene->object_ids.used,
-                            sizeof *scene->committed_objects) ||
-        !umb_memory_reserve(&scene->allocator, (void **)&scene->committed_occluders,
-                            &scene->committed_occluder_capacity, (size_t)occluders,
-                            sizeof *scene->committed_occluders) ||
-        !umb_memory_reserve(&scene->allocator, (void **)&scene->committed_moved,
-                            &scene->committed_moved_capacity, scene->object_ids.used,
-                            sizeof *scene->committed_moved)) {
-        /* Reserving may have moved an array: readers keep a valid one. */
-        scene->committed.objects = scene->committed_objects;
-        scene->committed.occluders = scene->committed_occluders;
-        scene->committed.moved = scene->committed_moved;
+    if (!ready) {
         return umb_scene_fail(scene, UMB_ERROR_MEMORY, "out of memory for a commit");
     }
-    fill_objects(scene);
-    fill_stand_alone(scene);
+    forget_replaced(scene);
+    extend_objects(scene);
+    remove_occluders(scene);
+    scene->committed.moved_count = 0;
+    for (uint32_t i = 0; i < scene->touched_count; ++i) {
+        commit_object(scene, scene->touched[i]);
+    }
+    add_stand_alone(scene);
     umb_ids_commit(&scene->object_ids);
     umb_ids_commit(&scene->occluder_ids);
     scene->committed.structure += 1;
-    scene->committed.moved_count = 0;
     return UMB_OK;
 }
 
-/* Only what a move changes. The two lists of moved objects change places. */
+/* Only what a move changes. */
 static void commit_moved(umb_scene *scene)
 {
-    for (uint32_t i = 0; i < scene->moved_count; ++i) {
-        umb_object_slot *slot = &scene->objects[scene->moved[i]];
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < scene->touched_count; ++i) {
+        umb_object_slot *slot = &scene->objects[scene->touched[i]];
         const umb_placement *p = &slot->placement;
-        umb_object *object = &scene->committed_objects[scene->moved[i]];
+        umb_object *object = &scene->committed_objects[scene->touched[i]];
         object->bounds = slot->bounds;
         object->transform = p->transform;
         object->identity = p->identity;
@@ -147,20 +235,16 @@ static void commit_moved(umb_scene *scene)
             occluder->identity = p->identity;
             occluder->mirrored = p->mirrored;
         }
-        slot->moved = false;
+        scene->committed_moved[count] = scene->touched[i];
+        count += object->live ? 1u : 0u;
+        slot->touched = false;
     }
-    uint32_t *moved = scene->moved;
-    size_t capacity = scene->moved_capacity;
-    scene->moved = scene->committed_moved;
-    scene->moved_capacity = scene->committed_moved_capacity;
-    scene->committed_moved = moved;
-    scene->committed_moved_capacity = capacity;
-    scene->committed.moved_count = scene->moved_count;
+    scene->committed.moved_count = count;
 }
 
 umb_result umb_scene_commit(umb_scene *scene)
 {
-    bool changed = scene->structure_changed || scene->moved_count > 0;
+    bool changed = scene->structure_changed || scene->touched_count > 0;
     if (scene->structure_changed) {
         umb_result result = commit_structure(scene);
         if (result != UMB_OK) {
@@ -169,11 +253,8 @@ umb_result umb_scene_commit(umb_scene *scene)
     } else if (changed) {
         commit_moved(scene);
     }
-    scene->moved_count = 0;
+    scene->touched_count = 0;
     scene->structure_changed = false;
-    scene->committed.objects = scene->committed_objects;
-    scene->committed.occluders = scene->committed_occluders;
-    scene->committed.moved = scene->committed_moved;
     scene->committed.version += changed ? 1 : 0;
     umb_weld_free_retired(scene);
     if (!changed && !scene->listeners_behind) {

@@ -22,22 +22,33 @@ typedef struct umb_object_slot {
     uint32_t flags;
     uint32_t weld; /* group it is welded into, or UMB_NONE */
     uint8_t state;
-    bool moved; /* is in the list of moved objects */
+    bool touched; /* is in the list of touched objects */
 } umb_object_slot;
 
 typedef struct umb_occluder_slot {
     umb_placement placement;
+    uint32_t number; /* of the committed occluder; UMB_NONE: there is none */
     uint8_t state;
+    bool touched; /* is in the list of touched occluders */
 } umb_occluder_slot;
 
 /* Objects joined into occluders of their own; one block of memory, meshes apart. */
 typedef struct umb_weld_group {
     uint32_t *members; /* ascending */
     umb_mesh **meshes; /* in world coordinates */
+    uint32_t *numbers; /* of the committed occluders, if committed */
     uint32_t member_count, mesh_count;
+    bool committed;
     size_t bytes;                /* of this block */
     struct umb_weld_group *next; /* among the retired */
 } umb_weld_group;
+
+/* What a committed occluder is made of, beside the owner that it names itself. */
+typedef struct umb_occluder_source {
+    umb_weld_group *group; /* NULL: owned or hand-made */
+    uint32_t index;        /* of the group's mesh, or the hand-made occluder */
+    bool replaced;         /* its number is in the list */
+} umb_occluder_source;
 
 struct umb_scene {
     umb_allocator allocator;
@@ -61,17 +72,20 @@ struct umb_scene {
     uint32_t group_count;
     umb_weld_group *retired; /* dissolved, but the committed occluders may still use their meshes */
 
-    uint32_t *moved; /* objects with new boxes since the last commit */
-    size_t moved_capacity;
-    uint32_t moved_count;
-    bool structure_changed;
+    /* Changed since the last commit, each once; there is always room for all. */
+    uint32_t *touched, *touched_occluders;
+    size_t touched_capacity, touched_occluder_capacity;
+    uint32_t touched_count, touched_occluder_count;
+    bool structure_changed, groups_changed;
     bool listeners_behind; /* one failed in the last commit */
 
     umb_committed committed;
     umb_object *committed_objects;
     umb_occluder *committed_occluders;
-    uint32_t *committed_moved;
-    size_t committed_object_capacity, committed_occluder_capacity, committed_moved_capacity;
+    umb_occluder_source *sources; /* of the committed occluders */
+    uint32_t *committed_moved, *committed_came, *committed_went, *committed_replaced;
+    size_t committed_object_capacity, committed_occluder_capacity, source_capacity;
+    size_t committed_moved_capacity, committed_came_capacity, committed_went_capacity, committed_replaced_capacity;
     umb_scene_listener *listeners;
 };
 
@@ -80,6 +94,15 @@ const umb_mesh *umb_scene_mesh(const umb_scene *scene, umb_shape shape);
 
 /* True if the object may hide at all, by its own shape or by a weld. */
 bool umb_scene_object_hides(const umb_scene *scene, const umb_object_slot *slot);
+
+/* Note that an object changed. */
+void umb_scene_touch_object(umb_scene *scene, uint32_t object);
+
+/* The committed occluders are numbered densely, owned ones first. Each call renumbers two others at most, and lists
+ * the numbers that hold another occluder than before. Room has been made. occluders.c */
+void umb_occluders_add_owned(umb_scene *scene, const umb_occluder *occluder);
+void umb_occluders_add_free(umb_scene *scene, const umb_occluder *occluder, umb_weld_group *group, uint32_t index);
+void umb_occluders_remove(umb_scene *scene, uint32_t number);
 
 /* Let the members of a group hide by their own shapes again. */
 void umb_weld_dissolve(umb_scene *scene, uint32_t group);

@@ -24,9 +24,11 @@ static void replace_groups(umb_scene *scene, umb_weld_group **groups, uint32_t c
         scene->groups[g] = groups[g];
         for (uint32_t i = 0; i < groups[g]->member_count; ++i) {
             scene->objects[groups[g]->members[i]].weld = g;
+            umb_scene_touch_object(scene, groups[g]->members[i]);
         }
     }
     scene->group_count = count;
+    scene->groups_changed = true;
     scene->structure_changed = true;
 }
 

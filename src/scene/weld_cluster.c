@@ -315,7 +315,7 @@ static bool make_meshes(const clusterer *c, umb_mesh **meshes)
 static umb_weld_group *make_group(const clusterer *c, uint32_t member_count, uint32_t mesh_count)
 {
     size_t bytes = sizeof(umb_weld_group) + mesh_count * sizeof(umb_mesh *) +
-                   member_count * sizeof(uint32_t);
+                   ((size_t)member_count + mesh_count) * sizeof(uint32_t);
     char *block = umb_memory_allocate(c->soup->allocator, bytes);
     if (block == NULL) {
         return NULL;
@@ -324,6 +324,7 @@ static umb_weld_group *make_group(const clusterer *c, uint32_t member_count, uin
     *g = (umb_weld_group){.bytes = bytes};
     g->meshes = (umb_mesh **)(void *)(block + sizeof *g);
     g->members = (uint32_t *)(void *)(block + sizeof *g + mesh_count * sizeof(umb_mesh *));
+    g->numbers = g->members + member_count;
     return g;
 }
 

@@ -20,6 +20,7 @@ void umb_weld_dissolve(umb_scene *scene, uint32_t group)
     umb_weld_group *g = scene->groups[group];
     for (uint32_t i = 0; i < g->member_count; ++i) {
         scene->objects[g->members[i]].weld = UMB_NONE;
+        umb_scene_touch_object(scene, g->members[i]);
     }
     g->next = scene->retired;
     scene->retired = g;
