@@ -1,8 +1,8 @@
-# What `cmake --install` lays down: the library and its headers, a CMake package, a pkg-config file,
+# What `cmake --install` lays down: the libraries and their headers, a CMake package, pkg-config files,
 # the program and its man pages.
 include(CMakePackageConfigHelpers)
 
-install(TARGETS umbrage EXPORT umbrage-targets
+install(TARGETS umbrage umbrage-bake EXPORT umbrage-targets
         ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
         LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}
         RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
@@ -17,8 +17,10 @@ write_basic_package_version_file(${CMAKE_BINARY_DIR}/umbrage-config-version.cmak
 install(FILES ${CMAKE_BINARY_DIR}/umbrage-config.cmake ${CMAKE_BINARY_DIR}/umbrage-config-version.cmake
         DESTINATION ${UMB_PACKAGE_DIR})
 
-configure_file(cmake/umbrage.pc.in ${CMAKE_BINARY_DIR}/umbrage.pc @ONLY)
-install(FILES ${CMAKE_BINARY_DIR}/umbrage.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+foreach(library umbrage umbrage-bake)
+  configure_file(cmake/${library}.pc.in ${CMAKE_BINARY_DIR}/${library}.pc @ONLY)
+endforeach()
+install(FILES ${CMAKE_BINARY_DIR}/umbrage.pc ${CMAKE_BINARY_DIR}/umbrage-bake.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 
 if(TARGET umbrage-program)
   install(TARGETS umbrage-program RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})

@@ -28,7 +28,7 @@ if(UMB_PROGRAM_SOURCES)
   add_executable(umbrage-program ${UMB_PROGRAM_SOURCES})
   set_target_properties(umbrage-program PROPERTIES OUTPUT_NAME umbrage
                         RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR})
-  target_link_libraries(umbrage-program PRIVATE umb_truth umb_io PkgConfig::JANSSON
+  target_link_libraries(umbrage-program PRIVATE umbrage_bake_inside umb_truth umb_io PkgConfig::JANSSON
                         PkgConfig::XXHASH m)
 endif()
 
@@ -39,7 +39,7 @@ foreach(library umb_truth umb_io)
     list(APPEND UMB_INSIDE ${library})
   endif()
 endforeach()
-list(APPEND UMB_INSIDE umbrage_inside)
+list(APPEND UMB_INSIDE umbrage_bake_inside umbrage_inside)
 
 # bench/compare: the library beside its rivals, in a library that is tested, and one program. The rivals get
 # what makes them fast, loose floats included; bench/yardstick_ISA.c has its instruction set's flags, as the

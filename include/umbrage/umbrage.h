@@ -9,6 +9,7 @@
 #include "geometry.h"
 #include "index.h"
 #include "light.h"
+#include "region.h"
 #include "scene.h"
 #include "view.h"
 

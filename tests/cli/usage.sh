@@ -6,6 +6,14 @@ scene=gen:blocks,g=2
 run
 run nosuch
 run region
+run region gen:blocks,g=2
+run region gen:blocks,g=2 --cell 1,2,3,4,5
+run region gen:blocks,g=2 --cell 1,2,3,0,5,6
+run region gen:blocks,g=2 --cell 1,2,3,4,5,6 --resolution 32
+run region gen:blocks,g=2 --cell 1,2,3,4,5,6 --umbrae 9
+run region gen:blocks,g=2 --cell 1,2,3,4,5,6 --outer 1
+run region gen:blocks,g=2 --cell 1,2,3,4,5,6 --near -1
+run region gen:blocks,g=2 --cell 1,2,3,4,5,6 --up 1,1,0
 run --nosuch
 run info
 run info --nosuch x

@@ -22,6 +22,8 @@ static const command commands[COMMAND_COUNT] = {
                           "Write a generated scene to a file", cmd_generate},
     [COMMAND_REPLAY] = {"replay", "FILE", "[options]", "Answer a captured frame again and compare",
                         cmd_replay},
+    [COMMAND_REGION] = {"region", "SCENE", "--cell X0,Y0,Z0,X1,Y1,Z1 [options]",
+                        "What may be seen from anywhere in a view cell", cmd_region},
 };
 
 static void print_help(void)

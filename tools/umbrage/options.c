@@ -14,7 +14,7 @@ enum {
     ONE_VIEW = BIT(CULL) | BIT(EXPLAIN) | BIT(RENDER),
     MANY_VIEWS = BIT(WALK) | BIT(CHECK),
     VIEWS = ONE_VIEW | MANY_VIEWS,
-    SCENES = BIT(INFO) | VIEWS
+    SCENES = BIT(INFO) | VIEWS | BIT(REGION)
 };
 
 /* ---- values --------------------------------------------------------------------------------- */
@@ -394,6 +394,26 @@ static const char *read_what(options *o, const char *text)
     return "one of eye, ids, occlusion, map, all";
 }
 
+static const char *read_cell(options *o, const char *text)
+{
+    return numbers(text, 6, o->cell) ? NULL : "six numbers X0,Y0,Z0,X1,Y1,Z1";
+}
+
+static const char *read_resolution(options *o, const char *text)
+{
+    return count(text, 64, 2048, &o->resolution) ? NULL : "64 to 2048";
+}
+
+static const char *read_umbrae(options *o, const char *text)
+{
+    return count(text, 1, 8, &o->umbrae) ? NULL : "1 to 8";
+}
+
+static const char *read_outer(options *o, const char *text)
+{
+    return number(text, &o->outer) || !(o->outer > 1.0 && o->outer <= 1e6) ? "a number above 1" : NULL;
+}
+
 /* Only that it was given matters. */
 static const char *read_flag(options *o, const char *text)
 {
@@ -421,7 +441,12 @@ static const option_spec specs[] = {
     {"from", 0, MANY_VIEWS, "N", read_from, "first row of the path (default 0)"},
     {"to", 0, MANY_VIEWS, "N", read_to, "last row of the path, included (default: its end)"},
     {"every", 0, MANY_VIEWS, "N", read_every, "take every N-th row only (default 1)"},
-    {"up", 0, VIEWS, "DIR", read_up, "up: x, y, z or X,Y,Z (default: as info says)"},
+    {"cell", 0, BIT(REGION), "X0,Y0,Z0,X1,Y1,Z1", read_cell, "the view cell, in the file's coordinates"},
+    {"resolution", 0, BIT(REGION), "N", read_resolution, "pixels along a side of the occlusion maps (default 512)"},
+    {"umbrae", 0, BIT(REGION), "K", read_umbrae, "intervals kept a direction, 1 to 8 (default 2)"},
+    {"outer", 0, BIT(REGION), "R", read_outer, "rays by two squares, the outer R times the inner (default: slabs)"},
+    {"half-umbra", 0, BIT(REGION), NULL, read_flag, "only what stands on the ground hides, and only its top counts"},
+    {"up", 0, VIEWS | BIT(REGION), "DIR", read_up, "up: x, y, z or X,Y,Z (default: as info says)"},
     {"fov", 0, VIEWS, "DEG", read_fov, "vertical field of view (default 60)"},
     {"ortho", 0, VIEWS, "HEIGHT", read_ortho, "parallel lines; height of the view instead of --fov"},
     {"spot", 0, VIEWS, "DEG", read_spot, "a spot light's cone, DEG wide, --far long"},
@@ -432,7 +457,7 @@ static const option_spec specs[] = {
     {"plane", 0, VIEWS, "A,B,C,D", read_plane,
      "cut by Ax + By + Cz + D >= 0; may be given ten times"},
     {"size", 0, VIEWS, "WxH", read_size, "the picture, square pixels (default 1024x512)"},
-    {"near", 0, VIEWS, "D", read_near, "depth of the near plane (default 0.1)"},
+    {"near", 0, VIEWS | BIT(REGION), "D", read_near, "depth of the near plane (default 0.1; region: 0)"},
     {"far", 0, VIEWS, "D|inf", read_far,
      "depth of the far plane (default: the scene's farthest corner)"},
 
@@ -447,7 +472,7 @@ static const option_spec specs[] = {
     {"no-weld", 0, SCENES, NULL, read_flag, "do not join touching objects into common occluders"},
     {"threads", 0, SCENES | BIT(REPLAY), "N", read_threads,
      "threads to build and trace with (default 1)"},
-    {"isa", 0, VIEWS | BIT(REPLAY), "NAME", read_isa,
+    {"isa", 0, VIEWS | BIT(REPLAY) | BIT(REGION), "NAME", read_isa,
      "auto, scalar, sse4, avx2 or neon (default auto)"},
 
     {"two-sided", 0, SCENES, NULL, read_two_sided, "faces block from both sides"},
@@ -456,8 +481,9 @@ static const option_spec specs[] = {
     {"seed", 0, SCENES | BIT(GENERATE), "N", read_seed,
      "seed of a generated scene and path that have one"},
 
-    {"list", 0, BIT(INFO) | BIT(CULL) | BIT(WALK), NULL, read_flag, "list the objects too"},
-    {"repeat", 0, BIT(CULL), "N", read_repeat, "answers that the time is the median of (default 5)"},
+    {"list", 0, BIT(INFO) | BIT(CULL) | BIT(WALK) | BIT(REGION), NULL, read_flag, "list the objects too"},
+    {"repeat", 0, BIT(CULL) | BIT(REGION), "N", read_repeat,
+     "answers that the time is the median of (default 5; region: the least)"},
     {"capture", 0, BIT(CULL), "FILE", read_capture, "write the frame for umbrage replay"},
     {"grid", 0, BIT(CHECK) | BIT(EXPLAIN), "WxH", read_grid,
      "first rays of the oracle (default: --size)"},

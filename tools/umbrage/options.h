@@ -49,6 +49,9 @@ typedef struct options {
     uint32_t coherence, occluder_budget; /* umb_culler_def */
     uint32_t threads, repeat;
 
+    double cell[6], outer; /* region: X0,Y0,Z0,X1,Y1,Z1 in the file's coordinates */
+    uint32_t resolution, umbrae;
+
     uint32_t grid_width, grid_height;
     uint64_t rays;
     uint32_t object;
@@ -73,6 +76,7 @@ enum {
     COMMAND_RENDER,
     COMMAND_GENERATE,
     COMMAND_REPLAY,
+    COMMAND_REGION,
     COMMAND_COUNT
 };
 
@@ -84,6 +88,7 @@ int cmd_explain(const options *o);
 int cmd_render(const options *o);
 int cmd_generate(const options *o);
 int cmd_replay(const options *o);
+int cmd_region(const options *o);
 
 /* Read the words after the subcommand. EXIT_DONE, or EXIT_USAGE with the message printed. *help is
  * set when help was asked for; nothing else is meaningful then. */

@@ -1,0 +1,96 @@
+/* From-region visibility: which objects can be seen from anywhere in a view cell. (Library umbrage-bake.)
+ *
+ * A view cell is a box where the eye may be. The answer is a potentially visible set: every object of which some
+ * point can be seen from some point of the cell is in it. The method is Leyvand's ray-space factorization
+ * (thesis, 2003, chapter 2), made strict; docs/conservative.md has the proofs.
+ *
+ * What hides, from a region: closed meshes, taken as solids, that the cell does not reach into, and triangles that
+ * the whole cell lies in front of (two-sided ones: beside). Everything else only can be seen.
+ */
+#ifndef UMBRAGE_REGION_H
+#define UMBRAGE_REGION_H
+
+#include "index.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct umb_region umb_region;
+
+typedef struct umb_region_def {
+    umb_isa isa;      /* AUTO by default; answers do not depend on it */
+    umb_tasks tasks;  /* for the refinement; answers do not depend on it */
+    umb_error *error; /* text of failures; may be NULL; must outlive the engine */
+} umb_region_def;
+
+/* Which axis is the vertical: the method treats it apart from the other two. */
+typedef enum umb_region_up { UMB_UP_Y = 0, UMB_UP_Z = 1, UMB_UP_X = 2 } umb_region_up;
+
+/* What is asked. Zeroed but for the box it means the default. */
+typedef struct umb_region_query {
+    double min[3], max[3]; /* the cell, closed, in the scene's coordinates (its origin subtracted). min <= max; flat
+                              cells and single points are cells too */
+    umb_region_up up;
+    /* Pixels along each side of an occlusion map: 64 to 2048, rounded up to a multiple of 64; 0: 512. */
+    uint32_t resolution;
+    /* Intervals that are kept for each horizontal direction: 1 to 8; 0: 1 with half_umbra, else 2. */
+    uint32_t umbrae;
+    /* Width of the outer square over the inner one, above 1 and at most 1e6; 0: rays by offset and slope, the
+       limit of large squares, with half the maps. The thesis has 2. */
+    double outer;
+    /* Only occluders that reach down to the lowest point of scene and cell, of which only the top is kept (the
+       thesis's half-umbra). Faster; hides less where things float, stand on pillars or hang. */
+    bool half_umbra;
+    /* Sight-lines may start this far ahead of the eye: occluders within four times that distance of the cell are
+       ignored. Then the set is right for views from within the cell whose near depth is at most near_depth and
+       whose picture's corners are at most 75 degrees off the axis. 0: sight-lines start at the eye. */
+    double near_depth;
+} umb_region_query;
+
+typedef struct umb_region_stats {
+    uint32_t objects;           /* live objects of the scene */
+    uint64_t triangles;         /* theirs, of all kinds */
+    uint64_t pvs_triangles;     /* of the objects in pvs */
+    uint64_t refined_triangles; /* of the objects in refined */
+    uint32_t nodes;             /* nodes of the index opened */
+    uint32_t queries;           /* boxes and objects asked about */
+    uint32_t occluders;         /* occluders used */
+    uint32_t patches;           /* pieces of theirs put into the occlusion maps */
+    uint32_t undecided;         /* by the refinement: neither proved hidden nor met by a trial ray */
+} umb_region_stats;
+
+/* The answer. Borrowed: valid until the engine's next umb_region_solve. Ids ascend. */
+typedef struct umb_region_answer {
+    const uint32_t *pvs; /* from the occlusion maps alone */
+    uint32_t pvs_count;
+    const uint32_t *refined; /* a subset of pvs, NULL before umb_region_refine */
+    uint32_t refined_count;
+    umb_region_stats stats;
+} umb_region_answer;
+
+/* Make an engine over an index, which must outlive it. One call at a time for each engine; several may read one
+ * index at once. Memory comes from the scene's allocator. Errors: an instruction set that is not there, no
+ * memory. */
+UMB_API umb_result umb_region_create(umb_index *index, const umb_region_def *def, umb_region **out);
+/* NULL is allowed. */
+UMB_API void umb_region_destroy(umb_region *region);
+
+/* The potentially visible set of one cell, from the occlusion maps. Safe direction: may report hidden objects;
+ * never leaves out one of which a point can be seen from a point of the cell, provided every object's bounds
+ * contain what is drawn for it. Objects that touch the cell are always in. Cost: proportional to what is in the
+ * answer. Errors: UMB_ERROR_ARGUMENT for cells that are inverted, not finite or farther out than 1e15 and for numbers out
+ * of range, UMB_ERROR_STATE after a commit that the index could not follow, no memory. *out is then empty. */
+UMB_API umb_result umb_region_solve(umb_region *region, const umb_region_query *query, umb_region_answer *out);
+
+/* Look again at what the last umb_region_solve left, object by object, in all directions alike: objects that are
+ * proved hidden go, by solids that each block a part of the cell from a part of the object (thesis 3.1 names the
+ * loss that this takes back). effort: how many parts a single object may be cut into before it stays in; 0: 512.
+ * Safe direction: as above. *out is the whole answer again. Errors: UMB_ERROR_STATE without a solve before it,
+ * no memory. */
+UMB_API umb_result umb_region_refine(umb_region *region, uint32_t effort, umb_region_answer *out);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,168 @@
+#include "solid.h"
+
+#include <string.h>
+
+#include "geometry/transform.h"
+
+void umb_solids_free(umb_solids *s)
+{
+    if (s->allocator != NULL) {
+        umb_memory_free(s->allocator, s->items, s->capacity * sizeof *s->items);
+        umb_memory_free(s->allocator, s->planes, s->plane_capacity * sizeof *s->planes);
+    }
+    memset(s, 0, sizeof *s);
+}
+
+void umb_box_corners(const double min[3], const double max[3], double out[8][3])
+{
+    for (int c = 0; c < 8; ++c) {
+        for (int k = 0; k < 3; ++k) {
+            out[c][k] = (c >> k & 1) != 0 ? max[k] : min[k];
+        }
+    }
+}
+
+void umb_solid_vertices(const umb_occluder *o, double out[][3])
+{
+    for (uint32_t i = 0; i < o->mesh->block_position_count; ++i) {
+        float p[3];
+        if (o->identity) {
+            memcpy(p, o->mesh->positions[i], sizeof p);
+        } else {
+            umb_transform_point(&o->transform, o->mesh->positions[i], p);
+        }
+        for (int k = 0; k < 3; ++k) {
+            out[i][k] = p[k];
+        }
+    }
+}
+
+static double value(const double plane[4], const double p[3])
+{
+    return plane[0] * p[0] + plane[1] * p[1] + plane[2] * p[2] + plane[3];
+}
+
+/* The plane of a triangle, normal outwards, moved inwards. With |u| and |v| the sums of absolute components of
+ * two sides and R the reach: each component of u x v is off by at most 2^-51 |u| |v|, a value of the plane at a point by
+ * three of these times 2 R, and by 5 roundings of terms that are at most |u| |v| R: together less than
+ * 2^-47 |u| |v| R. Four times that is taken. *error is it. */
+static void make_plane(const double p[][3], const uint32_t t[3], bool mirrored, double reach,
+                       double plane[4], double *error)
+{
+    umb_vec3 a = umb_vec3_from_double(p[t[0]]);
+    umb_vec3 b = umb_vec3_from_double(p[t[mirrored ? 2 : 1]]);
+    umb_vec3 c = umb_vec3_from_double(p[t[mirrored ? 1 : 2]]);
+    umb_vec3 u = umb_vec3_sub(b, a), v = umb_vec3_sub(c, a);
+    umb_vec3 n = umb_vec3_cross(u, v);
+    *error = 0x1p-45 * umb_vec3_sum_abs(u) * umb_vec3_sum_abs(v) * reach;
+    plane[0] = n.x;
+    plane[1] = n.y;
+    plane[2] = n.z;
+    plane[3] = -umb_vec3_dot(n, a) + *error;
+}
+
+/* True if all corners of the box lie surely farther out along the plane's normal than all vertices do. */
+static bool separates(const double plane[4], double error, const double p[][3], uint32_t count,
+                      const double box[8][3])
+{
+    double most = value(plane, p[0]), least = value(plane, box[0]);
+    for (uint32_t i = 1; i < count; ++i) {
+        double x = value(plane, p[i]);
+        most = x > most ? x : most;
+    }
+    for (int i = 1; i < 8; ++i) {
+        double x = value(plane, box[i]);
+        least = x < least ? x : least;
+    }
+    return least > most + 2.0 * error;
+}
+
+static bool boxes_apart(const umb_aabb *a, const double box[8][3])
+{
+    for (int k = 0; k < 3; ++k) {
+        if (box[0][k] > a->max[k] || box[7][k] < a->min[k]) {
+            return true;
+        }
+    }
+    return false;
+}
+
+umb_result umb_solids_add(umb_solids *s, const umb_occluder *o, uint32_t number, const double box[8][3],
+                          bool *added)
+{
+    const umb_mesh *m = o->mesh;
+    *added = false;
+    if (!m->convex || m->block_position_count > UMB_SOLID_VERTICES) {
+        return UMB_OK;
+    }
+    size_t first = s->plane_count;
+    if (!umb_memory_reserve(s->allocator, (void **)&s->items, &s->capacity, s->count + 1, sizeof *s->items) ||
+        !umb_memory_reserve(s->allocator, (void **)&s->planes, &s->plane_capacity, first + m->triangle_count,
+                            sizeof *s->planes)) {
+        return UMB_ERROR_MEMORY;
+    }
+    double p[UMB_SOLID_VERTICES][3], inner[3] = {0.0, 0.0, 0.0};
+    umb_solid_vertices(o, p);
+    for (uint32_t i = 0; i < m->block_position_count; ++i) {
+        for (int k = 0; k < 3; ++k) {
+            inner[k] += p[i][k] / m->block_position_count;
+        }
+    }
+    bool apart = boxes_apart(&o->bounds, box), solid = true;
+    for (uint32_t t = 0; t < m->triangle_count; ++t) {
+        double error, *plane = s->planes[first + t];
+        make_plane((const double(*)[3])p, m->triangles[t], o->mirrored, s->reach, plane, &error);
+        solid = solid && value(plane, inner) < 0.0;
+        apart = apart || separates(plane, error, (const double(*)[3])p, m->block_position_count, box);
+    }
+    if (!apart || !solid) {
+        return UMB_OK;
+    }
+    umb_solid *body = &s->items[s->count++];
+    *body = (umb_solid){o->bounds, number, (uint32_t)first, m->triangle_count, {inner[0], inner[1], inner[2]}};
+    s->plane_count = first + m->triangle_count;
+    *added = true;
+    return UMB_OK;
+}
+
+/* What is left of a segment inside all planes is not empty. Its ends are quotients of numbers of opposite signs, right
+ * to 2^-51. */
+static bool meets(const double (*planes)[4], uint32_t count, const double a[3], const double b[3])
+{
+    double from = 0.0, to = 1.0;
+    for (uint32_t i = 0; i < count; ++i) {
+        double va = value(planes[i], a), vb = value(planes[i], b);
+        if (!(va > 0.0) && !(vb > 0.0)) {
+            continue;
+        }
+        if (!(va <= 0.0) && !(vb <= 0.0)) {
+            return false;
+        }
+        double at = va / (va - vb);
+        if (va > 0.0) {
+            from = at > from ? at : from;
+        } else {
+            to = at < to ? at : to;
+        }
+        if (!(from + 0x1p-48 <= to)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+uint32_t umb_solid_blocks(const umb_solids *s, const umb_solid *body, umb_corners a, umb_corners b, bool all)
+{
+    const double(*planes)[4] = (const double(*)[4])s->planes + body->first_plane;
+    uint32_t blocked = 0;
+    for (uint32_t i = 0; i < a.count; ++i) {
+        for (uint32_t j = 0; j < b.count; ++j) {
+            if (meets(planes, body->plane_count, a.points[i], b.points[j])) {
+                blocked += 1;
+            } else if (all) {
+                return blocked;
+            }
+        }
+    }
+    return blocked;
+}
