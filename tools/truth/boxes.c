@@ -123,37 +123,47 @@ bool oracle_boxes_build(truth *t)
     return true;
 }
 
-/* Does the segment meet the box? Grown by 1e-9 of the largest coordinate: a million times what the
- * rounding of these few operations can be, so a box that is touched is never passed over. */
-static bool segment_meets_box(const double from[3], const double to[3], const umb_aabb *box)
+/* A segment made ready for many boxes. pad: 1e-9 of the largest coordinate about, a million times what
+ * the rounding of these few operations can be, so a box that is touched is never passed over. */
+typedef struct segment {
+    double from[3], length[3], inverse[3], pad;
+} segment;
+
+static void segment_make(const truth *t, const double from[3], const double to[3], segment *out)
 {
-    double low = 0.0, high = 1.0;
+    const umb_aabb *all = &t->box_nodes[0].box;
+    double size = 0.0;
+    for (int i = 0; i < 3; ++i) {
+        size = fmax(size, fmax(fabs(from[i]), fabs(to[i])));
+        size = fmax(size, fmax(fabs((double)all->min[i]), fabs((double)all->max[i])));
+    }
+    out->pad = 1e-9 * size;
     for (int i = 0; i < 3; ++i) {
         double d = to[i] - from[i];
-        double size = fmax(fmax(fabs(from[i]), fabs(to[i])),
-                           fmax(fabs((double)box->min[i]), fabs((double)box->max[i])));
-        double a = box->min[i] - from[i] - 1e-9 * size, b = box->max[i] - from[i] + 1e-9 * size;
-        if (fabs(d) <= 1e-9 * size) {
-            if (a > fabs(d) || b < -fabs(d)) {
-                return false;
-            }
-            continue;
-        }
-        double s0 = a / d, s1 = b / d;
-        low = fmax(low, fmin(s0, s1));
-        high = fmin(high, fmax(s0, s1));
+        out->from[i] = from[i];
+        out->length[i] = fabs(d);
+        out->inverse[i] = fabs(d) > out->pad ? 1.0 / d : 0.0; /* 0: it runs across this axis */
     }
-    return low <= high + 1e-9;
 }
-
-typedef struct segment {
-    const double *from, *to;
-} segment;
 
 static bool on_segment(const void *where, const umb_aabb *box)
 {
     const segment *s = where;
-    return segment_meets_box(s->from, s->to, box);
+    double low = 0.0, high = 1.0 + 1e-9;
+    for (int i = 0; i < 3; ++i) {
+        double a = box->min[i] - s->from[i] - s->pad, b = box->max[i] - s->from[i] + s->pad;
+        if (s->inverse[i] == 0.0) {
+            if (a > s->length[i] || b < -s->length[i]) {
+                return false;
+            }
+            continue;
+        }
+        double s0 = a * s->inverse[i], s1 = b * s->inverse[i];
+        double first = s0 < s1 ? s0 : s1, last = s0 < s1 ? s1 : s0;
+        low = first > low ? first : low;
+        high = last < high ? last : high;
+    }
+    return low <= high + 1e-9;
 }
 
 typedef struct box_walk {
@@ -189,7 +199,11 @@ static bool walk(box_walk *w, uint32_t first, uint32_t last)
 bool oracle_boxes_walk(const truth *t, const double from[3], const double to[3],
                        oracle_visit *visit, void *user)
 {
-    segment s = {from, to};
+    segment s;
+    if (t->chunk_count == 0) {
+        return true;
+    }
+    segment_make(t, from, to, &s);
     return oracle_boxes_visit(t, on_segment, &s, visit, user);
 }
 

@@ -31,6 +31,7 @@ typedef struct confirmation {
     linear beyond_near;
     exact_crossing target;
     uint32_t object;
+    uint32_t only; /* the one triangle of the object that will do; MODEL_NONE: any */
     uint8_t renderer;
     bool found, lost;
 } confirmation;
@@ -141,31 +142,41 @@ static bool reach(confirmation *c, float v[3][3], exact_crossing *at)
     return meeting == EXACT_CROSS;
 }
 
-/* The nearest point of the object on the line that the renderer shows and the view holds. */
+/* Take the triangle for a target if the renderer shows it, the view holds it and none is nearer. */
+static void aim_at_triangle(confirmation *c, uint32_t triangle)
+{
+    float v[3][3];
+    exact_crossing at;
+    oracle_triangle(c->t, c->object, triangle, v);
+    if (!reach(c, v, &at)) {
+        return;
+    }
+    if (c->renderer == TRUTH_CULLING &&
+        !oracle_shown(oracle_flags(c->t, c->object, triangle), at.facing)) {
+        return;
+    }
+    if ((!c->found || exact_compare(&at, &c->target, &c->lost) < 0) && in_view(c, &at)) {
+        c->target = at;
+        c->found = true;
+    }
+}
+
 static bool aim_at_chunk(void *user, const oracle_chunk *chunk)
 {
     confirmation *c = user;
     for (uint32_t i = chunk->first; chunk->object == c->object && i < chunk->last; ++i) {
-        float v[3][3];
-        exact_crossing at;
-        oracle_triangle(c->t, c->object, i, v);
-        if (!reach(c, v, &at)) {
-            continue;
-        }
-        if (c->renderer == TRUTH_CULLING &&
-            !oracle_shown(oracle_flags(c->t, c->object, i), at.facing)) {
-            continue;
-        }
-        if ((!c->found || exact_compare(&at, &c->target, &c->lost) < 0) && in_view(c, &at)) {
-            c->target = at;
-            c->found = true;
-        }
+        aim_at_triangle(c, i);
     }
     return true;
 }
 
+/* The nearest point of what is claimed on the line that the renderer shows and the view holds. */
 static bool find_target(confirmation *c)
 {
+    if (c->only != MODEL_NONE) {
+        aim_at_triangle(c, c->only);
+        return c->found && !c->lost;
+    }
     double end[3];
     double length = c->v->far_depth - c->v->view->near_depth;
     oracle_sight_at(&c->sight, length + 1e-6 * fabs(length), end);
@@ -225,11 +236,24 @@ static bool passes_chunk(void *user, const oracle_chunk *chunk)
     return true;
 }
 
-bool oracle_confirm(const truth *t, const oracle_view *v, const double through[3], uint32_t object,
-                    uint8_t renderer, truth_witness *out)
+/* What is said to be seen, and where rays met it. */
+typedef struct claim {
+    uint32_t object, triangle;
+    bool only; /* nothing but that triangle will do */
+    uint8_t renderer;
+} claim;
+
+static bool confirm_line(const truth *t, const oracle_view *v, const double through[3],
+                         const claim *what, truth_witness *out)
 {
     const umb_view *view = v->view;
-    confirmation c = {.t = t, .v = v, .through = through, .object = object, .renderer = renderer};
+    uint8_t renderer = what->renderer;
+    confirmation c = {.t = t,
+                      .v = v,
+                      .through = through,
+                      .object = what->object,
+                      .only = what->only ? what->triangle : MODEL_NONE,
+                      .renderer = renderer};
     if (!view_in_range(view) || !in_range3(through) || !oracle_sight_make(v, through, &c.sight)) {
         return false;
     }
@@ -255,11 +279,17 @@ bool oracle_confirm(const truth *t, const oracle_view *v, const double through[3
     return true;
 }
 
+bool oracle_confirm(const truth *t, const oracle_view *v, const double through[3], uint32_t object,
+                    uint8_t renderer, truth_witness *out)
+{
+    claim what = {.object = object, .triangle = MODEL_NONE, .renderer = renderer};
+    return confirm_line(t, v, through, &what, out);
+}
+
 /* What has no area, or none seen from here, is met only by lines drawn through points of its
  * border that doubles can say: corners, and 1024ths of an edge near the point where rays met it. */
 static bool confirm_on_border(const truth *t, const oracle_view *v, const double through[3],
-                              uint32_t object, float corner[3][3], uint8_t renderer,
-                              truth_witness *out)
+                              const claim *what, float corner[3][3], truth_witness *out)
 {
     for (int k = 0; k < 3; ++k) {
         const float *a = corner[k], *b = corner[(k + 1) % 3];
@@ -274,7 +304,7 @@ static bool confirm_on_border(const truth *t, const oracle_view *v, const double
             for (int i = 0; i < 3; ++i) {
                 point[i] = a[i] + share * ((double)b[i] - a[i]);
             }
-            if (share >= 0.0 && share <= 1.0 && oracle_confirm(t, v, point, object, renderer, out)) {
+            if (share >= 0.0 && share <= 1.0 && confirm_line(t, v, point, what, out)) {
                 return true;
             }
         }
@@ -282,28 +312,43 @@ static bool confirm_on_border(const truth *t, const oracle_view *v, const double
     return false;
 }
 
-bool oracle_confirm_near(const truth *t, const oracle_view *v, const double through[3],
-                         uint32_t object, uint32_t triangle, uint8_t renderer, truth_witness *out)
+static bool confirm_near(const truth *t, const oracle_view *v, const double through[3],
+                         const claim *what, truth_witness *out)
 {
-    if (oracle_confirm(t, v, through, object, renderer, out)) {
+    if (confirm_line(t, v, through, what, out)) {
         return true;
     }
     float corner[3][3];
     oracle_polygon polygon;
-    oracle_triangle(t, object, triangle, corner);
+    oracle_triangle(t, what->object, what->triangle, corner);
     oracle_clip(v, corner, &polygon);
     for (uint32_t k = 0; k < NEARBY_LINES && polygon.count; ++k) {
         double towards[3], point[3];
-        uint64_t random = oracle_mix(object, triangle, k);
+        uint64_t random = oracle_mix(what->object, what->triangle, k);
         oracle_polygon_point(&polygon, UINT32_MAX, 0.0, random, towards);
         /* From a ten-millionth of the way to other points of the triangle up to all of it. */
         double step = pow(10.0, -7.0 + 0.25 * (double)(k + 1));
         for (int i = 0; i < 3; ++i) {
             point[i] = through[i] + step * (towards[i] - through[i]);
         }
-        if (oracle_confirm(t, v, point, object, renderer, out)) {
+        if (confirm_line(t, v, point, what, out)) {
             return true;
         }
     }
-    return confirm_on_border(t, v, through, object, corner, renderer, out);
+    return confirm_on_border(t, v, through, what, corner, out);
+}
+
+bool oracle_confirm_near(const truth *t, const oracle_view *v, const double through[3],
+                         uint32_t object, uint32_t triangle, uint8_t renderer, truth_witness *out)
+{
+    claim what = {.object = object, .triangle = triangle, .renderer = renderer};
+    return confirm_near(t, v, through, &what, out);
+}
+
+bool oracle_confirm_triangle(const truth *t, const oracle_view *v, const double through[3],
+                             uint32_t object, uint32_t triangle, uint8_t renderer,
+                             truth_witness *out)
+{
+    claim what = {.object = object, .triangle = triangle, .only = true, .renderer = renderer};
+    return confirm_near(t, v, through, &what, out);
 }

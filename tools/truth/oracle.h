@@ -41,6 +41,7 @@ struct truth {
     uint64_t *first_vertex;   /* flat: per object, into vertices */
     uint64_t *first_triangle; /* per object, and the total at the end: numbers triangles of objects */
     bool *mirrored;           /* per object */
+    bool has_open;            /* some triangle is open: hits must be looked at one by one */
     oracle_part parts[PART_KINDS];         /* flat */
     oracle_part (*mesh_parts)[PART_KINDS]; /* instanced: per mesh */
     RTCScene *mesh_scenes;
@@ -141,6 +142,10 @@ bool oracle_confirm(const truth *t, const oracle_view *v, const double through[3
  * lines near it are tried. */
 bool oracle_confirm_near(const truth *t, const oracle_view *v, const double through[3],
                          uint32_t object, uint32_t triangle, uint8_t renderer, truth_witness *out);
+/* The same, but only the triangle itself will do, not another one of its object. */
+bool oracle_confirm_triangle(const truth *t, const oracle_view *v, const double through[3],
+                             uint32_t object, uint32_t triangle, uint8_t renderer,
+                             truth_witness *out);
 
 /* A triangle cut to the view. */
 #define ORACLE_POLYGON 24

@@ -88,7 +88,7 @@ static void cast_ray(const truth *t, const oracle_sight *sight, float start, flo
     q.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     q.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
     rtcInitIntersectContext(&c->base);
-    c->base.filter = filter;
+    c->base.filter = c->culling || t->has_open ? filter : NULL;
     c->trace->open_count = 0;
     rtcIntersect1(t->scene, &c->base, &q);
     hit->object = MODEL_NONE;

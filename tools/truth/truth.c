@@ -80,6 +80,7 @@ static void scatter_object(truth *t, uint32_t object, uint32_t count[PART_KINDS]
             uint32_t j = t->mirrored[object] ? (3 - i) % 3 : i;
             t->indices[part][3 * (size_t)slot + i] = (uint32_t)(t->first_vertex[object] + corner[j]);
         }
+        t->has_open |= part == PART_OPEN;
         t->parts[part].objects[slot] = object;
         t->parts[part].triangles[slot] = k;
     }
@@ -225,6 +226,7 @@ static bool build_mesh(truth *t, uint32_t number)
         uint32_t n = 0;
         for (uint32_t k = 0; k < mesh->triangle_count; ++k) {
             if (part_of(mesh->flags[k]) == p) {
+                t->has_open |= p == PART_OPEN;
                 memcpy(index + 3 * (size_t)n, mesh->indices + 3 * (size_t)k, 12);
                 part->triangles[n++] = k;
             }

@@ -5,7 +5,7 @@
 
 #include "part_file.h"
 #include "progress.h"
-#include "setup.h"
+#include "region_check.h"
 
 /* The vertical is one of the axes here. */
 static int read_axis(const options *o, const double up[3], umb_region_up *out)
@@ -45,8 +45,16 @@ static int make_query(const setup *s, const options *o, umb_region_query *out)
     return read_axis(o, options_given(o, "up") ? o->up : s->model->up, &out->up);
 }
 
-static int print_json(const options *o, const umb_region_answer *a, double solve_ms, double refine_ms)
+/* An answer with what is told beside it. */
+typedef struct report {
+    const umb_region_answer *answer;
+    double solve_ms, refine_ms;
+    region_check check;
+} report;
+
+static int print_json(const setup *s, const options *o, const report *r)
 {
+    const umb_region_answer *a = r->answer;
     json_text j = {0};
     json_text_open(&j, NULL, '{');
     json_text_count(&j, "objects", a->stats.objects);
@@ -58,8 +66,9 @@ static int print_json(const options *o, const umb_region_answer *a, double solve
     json_text_count(&j, "undecided", a->stats.undecided);
     json_text_count(&j, "occluders", a->stats.occluders);
     json_text_count(&j, "queries", a->stats.queries);
-    json_text_number(&j, "time_ms", solve_ms);
-    json_text_number(&j, "refine_ms", refine_ms);
+    json_text_number(&j, "time_ms", r->solve_ms);
+    json_text_number(&j, "refine_ms", r->refine_ms);
+    region_check_json(&r->check, s, &j);
     if (options_given(o, "list")) {
         json_text_ids(&j, "ids", a->refined, a->refined_count);
     }
@@ -67,14 +76,18 @@ static int print_json(const options *o, const umb_region_answer *a, double solve
     return part_file_print(o, &j);
 }
 
-static int print_text(const options *o, const umb_region_answer *a, double solve_ms, double refine_ms)
+static int print_text(const setup *set, const options *o, const report *r)
 {
+    const umb_region_answer *a = r->answer;
     const umb_region_stats *s = &a->stats;
     printf("%-12s %12s %12s\n", "", "objects", "triangles");
     printf("%-12s %12u %12llu\n", "scene", s->objects, (unsigned long long)s->triangles);
-    printf("%-12s %12u %12llu   %.3f ms\n", "pvs", a->pvs_count, (unsigned long long)s->pvs_triangles, solve_ms);
+    printf("%-12s %12u %12llu   %.3f ms\n", "pvs", a->pvs_count, (unsigned long long)s->pvs_triangles,
+           r->solve_ms);
     printf("%-12s %12u %12llu   %.3f ms\n", "refined", a->refined_count,
-           (unsigned long long)s->refined_triangles, refine_ms);
+           (unsigned long long)s->refined_triangles, r->refine_ms);
+    region_check_row(&r->check);
+    region_check_text(&r->check, set, o);
     for (uint32_t i = 0; options_given(o, "list") && i < a->refined_count; ++i) {
         printf("%u\n", a->refined[i]);
     }
@@ -87,26 +100,41 @@ static double since(double start)
 }
 
 /* The time is the least of --repeat answers after one that grows buffers. */
-static int solve(const options *o, umb_region *region, const umb_region_query *query, umb_error *error)
+static umb_result solve(const options *o, umb_region *region, const umb_region_query *query,
+                        umb_region_answer *a, report *out)
 {
-    umb_region_answer a;
-    double solve_ms = INFINITY, refine_ms = 0.0;
-    umb_result result = umb_region_solve(region, query, &a);
+    out->solve_ms = INFINITY;
+    umb_result result = umb_region_solve(region, query, a);
     for (uint32_t i = 0; result == UMB_OK && i < o->repeat; ++i) {
         double start = progress_clock();
-        result = umb_region_solve(region, query, &a);
-        solve_ms = fmin(solve_ms, since(start));
+        result = umb_region_solve(region, query, a);
+        out->solve_ms = fmin(out->solve_ms, since(start));
     }
     if (result == UMB_OK) {
         double start = progress_clock();
-        result = umb_region_refine(region, 0, &a);
-        refine_ms = since(start);
+        result = umb_region_refine(region, 0, a);
+        out->refine_ms = since(start);
     }
+    return result;
+}
+
+static int answer(const setup *s, const options *o, umb_region *region, const umb_region_query *query)
+{
+    umb_region_answer a;
+    report r = {.answer = &a};
+    umb_result result = solve(o, region, query, &a, &r);
     if (result != UMB_OK) {
-        return fail(o, result == UMB_ERROR_ARGUMENT ? EXIT_USAGE : EXIT_INPUT, "%s", error->text);
+        return fail(o, result == UMB_ERROR_ARGUMENT ? EXIT_USAGE : EXIT_INPUT, "%s", s->error.text);
     }
-    return options_given(o, "json") ? print_json(o, &a, solve_ms, refine_ms)
-                                    : print_text(o, &a, solve_ms, refine_ms);
+    int code = region_check_run(s, o, query, &a, &r.check);
+    if (code == EXIT_DONE) {
+        code = options_given(o, "json") ? print_json(s, o, &r) : print_text(s, o, &r);
+    }
+    if (code == EXIT_DONE) {
+        code = region_check_code(&r.check);
+    }
+    region_check_free(&r.check);
+    return code;
 }
 
 int cmd_region(const options *o)
@@ -124,7 +152,7 @@ int cmd_region(const options *o)
     if (code == EXIT_DONE) {
         umb_region_def def = {.isa = o->isa, .tasks = s.tasks, .error = &s.error};
         umb_result result = umb_region_create(s.index, &def, &region);
-        code = result == UMB_OK ? solve(o, region, &query, &s.error) : fail(o, EXIT_INPUT, "%s", s.error.text);
+        code = result == UMB_OK ? answer(&s, o, region, &query) : fail(o, EXIT_INPUT, "%s", s.error.text);
     }
     umb_region_destroy(region);
     setup_free(&s);

@@ -360,8 +360,11 @@ static const char *read_grid(options *o, const char *text)
 
 static const char *read_rays(options *o, const char *text)
 {
-    return whole(text, (uint64_t)1 << 40, &o->rays) && o->rays > 0 ? NULL
-                                                                   : "a number of rays from 1";
+    bool none = strcmp(o->command, "region") == 0; /* may cast none */
+    if (whole(text, (uint64_t)1 << 40, &o->rays) && (o->rays > 0 || none)) {
+        return NULL;
+    }
+    return none ? "a number of rays" : "a number of rays from 1";
 }
 
 static const char *read_object(options *o, const char *text)
@@ -487,7 +490,9 @@ static const option_spec specs[] = {
     {"capture", 0, BIT(CULL), "FILE", read_capture, "write the frame for umbrage replay"},
     {"grid", 0, BIT(CHECK) | BIT(EXPLAIN), "WxH", read_grid,
      "first rays of the oracle (default: --size)"},
-    {"rays", 0, BIT(CHECK) | BIT(EXPLAIN), "N", read_rays, "most guided rays a view (default 4M)"},
+    {"check", 0, BIT(REGION), NULL, read_flag, "hold the answer against many rays from the cell"},
+    {"rays", 0, BIT(CHECK) | BIT(EXPLAIN) | BIT(REGION), "N", read_rays,
+     "most guided rays a view (default 4M); from a cell 0.5M, to check 4M"},
     {"object", 0, BIT(EXPLAIN), "ID", read_object, "the object to explain"},
     {"what", 0, BIT(RENDER), "KIND", read_what, "eye, ids, occlusion, map or all (default eye)"},
     {"output", 'o', BIT(RENDER) | BIT(GENERATE), "FILE", read_output, "the file to write"},
