@@ -4,6 +4,7 @@
 #define UMBRAGE_H
 
 #include "base.h"
+#include "bounds.h"
 #include "capture.h"
 #include "cull.h"
 #include "geometry.h"
