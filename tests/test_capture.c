@@ -191,7 +191,7 @@ static void test_round_trip(void **state)
             umb_error error = {0};
             assert_int_equal(umb_capture_load(bytes, size, UMB_ISA_AUTO, none, &c, &error), UMB_OK);
             assert_int_equal(c.method, method);
-            assert_int_equal(c.kind, kind);
+            assert_int_equal(c.index_def.kind, kind);
             assert_int_equal(c.answer_count, seen.count);
             assert_memory_equal(c.answer, seen.objects, seen.count * sizeof *c.answer);
             assert_int_equal(umb_cull(c.culler, &c.view, &again), UMB_OK);

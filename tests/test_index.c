@@ -254,8 +254,8 @@ static void check_restored(umb_scene *scene, const umb_index_def *def, const umb
     for (uint32_t k = 0; k < t->node_count; ++k) {
         memcpy(refs[k], t->nodes[k].ref, sizeof(refs[k]));
     }
-    assert_int_equal(umb_index_restore(scene, def, (const uint32_t(*)[UMB_NODE_WIDTH])refs, t->node_count, &again),
-                     UMB_OK);
+    umb_stored_tree stored = {.refs = (const uint32_t(*)[UMB_NODE_WIDTH])refs, .node_count = t->node_count};
+    assert_int_equal(umb_index_restore(scene, def, &stored, &again), UMB_OK);
     check_index(again);
     assert_memory_equal(umb_index_tree(again)->objects, t->objects, t->object_count * sizeof(t->objects[0]));
     umb_index_destroy(again);
@@ -276,7 +276,7 @@ static void test_all_sets(void **state)
                 assert_int_equal(umb_index_create(scene, &def, &index), UMB_OK);
                 check_index(index);
                 check_restored(scene, &def, index);
-                assert_int_equal(umb_index_get_kind(index), kind);
+                assert_int_equal(umb_index_settings(index).kind, kind);
                 umb_index_destroy(index);
             }
             umb_scene_destroy(scene);
@@ -440,16 +440,16 @@ static void test_same_for_any_workers(void **state)
             }
             uint32_t count = 40000;
             umb_bvh_item *items = make_items(set, count);
-            umb_node *nodes;
-            uint32_t node_count;
-            assert_int_equal(umb_bvh_build(&a, &tasks, items, count, &nodes, &node_count), UMB_OK);
+            umb_built built;
+            assert_int_equal(umb_bvh_build(&a, &tasks, items, count, &built), UMB_OK);
+            assert_int_equal(built.slot_count, count);
             if (first == NULL) {
-                first = nodes;
-                first_count = node_count;
+                first = built.nodes;
+                first_count = built.node_count;
             } else {
-                assert_int_equal(node_count, first_count);
-                assert_memory_equal(nodes, first, node_count * sizeof(nodes[0]));
-                umb_memory_free(&a, nodes, node_count * sizeof(nodes[0]));
+                assert_int_equal(built.node_count, first_count);
+                assert_memory_equal(built.nodes, first, first_count * sizeof(first[0]));
+                umb_built_free(&built, &a);
             }
             free(items);
             umb_pool_destroy(pool);

@@ -1,5 +1,5 @@
-/* Nothing that can be seen is hidden: adversarial micro-scenes under three raster sizes, both
- * indices, against the oracle. UMBRAGE_MICRO_SCENES sets how many (500; small 60; full 10,000). */
+/* Nothing that can be seen is hidden: adversarial micro-scenes under three raster sizes, and with
+ * every kind of index, against the oracle. UMBRAGE_MICRO_SCENES sets how many (500; small 60; full 10,000). */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -32,6 +32,29 @@ static uint64_t first_wanted(void)
     return text != NULL ? strtoull(text, NULL, 10) : 0;
 }
 
+/* Kinds of indices beside the first two, which take turns with all sizes. */
+enum { SIZED = 3, MOST = 64 };
+
+typedef struct asked {
+    umb_index *index;
+    umb_culler *culler;
+    char label[128];
+} asked;
+
+static void ask(umb_scene *scene, const char *kind, const micro_scene *micro, uint64_t number, asked *out,
+                strict_answer *answer)
+{
+    umb_index_def def = {0};
+    umb_visible_set seen;
+    assert_true(umb_index_parse(kind, &def));
+    assert_int_equal(umb_index_create(scene, &def, &out->index), UMB_OK);
+    assert_int_equal(umb_culler_create(out->index, NULL, &out->culler), UMB_OK);
+    assert_int_equal(umb_cull(out->culler, &micro->view, &seen), UMB_OK);
+    (void)snprintf(out->label, sizeof out->label, "micro scene %llu (%s) at %ux%u, %s", (unsigned long long)number,
+                   micro->kind, micro->view.buffer_width, micro->view.buffer_height, kind);
+    *answer = (strict_answer){seen.objects, seen.count, out->label, NULL};
+}
+
 static void check_scene(uint64_t number, strict_count *sums)
 {
     micro_scene micro;
@@ -42,30 +65,30 @@ static void check_scene(uint64_t number, strict_count *sums)
     assert_non_null(scene);
     truth *oracle = truth_create(micro.model, &error);
     assert_non_null(oracle);
-    umb_index *index = NULL;
-    umb_index_def index_def = {.kind = number % 7 == 0 ? UMB_INDEX_FLAT : UMB_INDEX_BVH};
-    assert_int_equal(umb_index_create(scene, &index_def, &index), UMB_OK);
-    umb_culler *cullers[3] = {NULL};
-    strict_answer answers[3];
-    char labels[3][96];
-    for (int s = 0; s < 3; ++s) {
-        assert_int_equal(umb_culler_create(index, NULL, &cullers[s]), UMB_OK);
-        micro.view.buffer_width = SIZES[s][0];
-        micro.view.buffer_height = SIZES[s][1];
-        umb_visible_set seen;
-        assert_int_equal(umb_cull(cullers[s], &micro.view, &seen), UMB_OK);
-        (void)snprintf(labels[s], sizeof labels[s], "micro scene %llu (%s) at %ux%u",
-                       (unsigned long long)number, micro.kind, SIZES[s][0], SIZES[s][1]);
-        answers[s] = (strict_answer){seen.objects, seen.count, labels[s],
-                                     &sums[number % micro_scene_kinds()]};
+    asked all[SIZED + MOST];
+    strict_answer answers[SIZED + MOST];
+    uint32_t n = 0;
+    for (; n < SIZED; ++n) {
+        micro.view.buffer_width = SIZES[n][0];
+        micro.view.buffer_height = SIZES[n][1];
+        ask(scene, number % 7 == 0 ? "flat" : "bvh", &micro, number, &all[n], &answers[n]);
+    }
+    micro.view.buffer_width = SIZES[1][0];
+    micro.view.buffer_height = SIZES[1][1];
+    for (uint32_t k = 2; umb_index_variant(k) != NULL; ++k, ++n) {
+        assert_true(n < SIZED + MOST);
+        ask(scene, umb_index_variant(k), &micro, number, &all[n], &answers[n]);
+    }
+    for (uint32_t k = 0; k < n; ++k) {
+        answers[k].sum = &sums[number % micro_scene_kinds()];
     }
     truth_options options = {
         .grid_width = 96, .grid_height = 96, .guided_rays = 120000, .threads = 1};
-    assert_true(strict_check_all(oracle, micro.model, &micro.view, answers, 3, &options));
-    for (int s = 0; s < 3; ++s) {
-        umb_culler_destroy(cullers[s]);
+    assert_true(strict_check_all(oracle, micro.model, &micro.view, answers, n, &options));
+    for (uint32_t k = 0; k < n; ++k) {
+        umb_culler_destroy(all[k].culler);
+        umb_index_destroy(all[k].index);
     }
-    umb_index_destroy(index);
     umb_scene_destroy(scene);
     truth_destroy(oracle);
     micro_scene_free(&micro);

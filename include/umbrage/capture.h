@@ -23,7 +23,7 @@ typedef struct umb_capture {
     umb_culler *culler;
     umb_view view;
     umb_method method;
-    umb_index_kind kind;
+    umb_index_def index_def;
     uint32_t *answer; /* ids as they were answered, in order */
     uint32_t answer_count;
     void *block; /* owns answer */

@@ -13,18 +13,31 @@ typedef struct umb_index umb_index;
 
 typedef enum umb_index_kind {
     UMB_INDEX_BVH = 0,  /* bounding volume hierarchy, eight children a node, surface-area splits */
-    UMB_INDEX_FLAT = 1  /* no hierarchy by place: rows of eight boxes in the order of their ids; the
+    UMB_INDEX_FLAT = 1, /* no hierarchy by place: rows of eight boxes in the order of their ids; the
                             raster method looks at every one, UMB_METHOD_NONE first at boxes around
                             runs of rows, which help as far as neighbours in the list are near */
+    /* Space is cut by planes across an axis; what a plane cuts is in both halves, each with the box of its part. An
+       object then is in several cells, is answered once, and is visible if any part of it may be seen (Gummerus 3.5) */
+    UMB_INDEX_KDTREE = 2
 } umb_index_kind;
+
+/* How a kind decides where to split. */
+typedef enum umb_index_rule {
+    UMB_RULE_DEFAULT = 0, /* BVH, KDTREE: by surface area */
+    /* KDTREE: axes in turn (Bentley); of the faces of boxes that leave at least three eighths on each side, the plane
+       that cuts the fewest */
+    UMB_RULE_MEDIAN = 1
+} umb_index_rule;
 
 typedef struct umb_index_def {
     umb_index_kind kind;
+    umb_index_rule rule;
     umb_tasks tasks; /* for building; the result does not depend on it */
 } umb_index_def;
 
 typedef struct umb_index_stats {
     uint32_t items;  /* objects and stand-alone occluders in it */
+    uint32_t slots;  /* that name them: more than items where some are in several cells */
     uint32_t nodes;
     uint32_t depth;  /* nodes on the longest way from the root; 0 when empty */
     double cost;     /* expected boxes tested by a random ray, by surface area */
@@ -37,8 +50,16 @@ UMB_API umb_result umb_index_create(umb_scene *scene, const umb_index_def *def, 
 /* NULL is allowed. Its cullers must be destroyed first. */
 UMB_API void umb_index_destroy(umb_index *index);
 UMB_API void umb_index_get_stats(const umb_index *index, umb_index_stats *out);
-/* "bvh", "flat". */
+/* "bvh", "flat", "kdtree". */
 UMB_API const char *umb_index_kind_name(umb_index_kind kind);
+
+/* Indices by name: a kind, then words with commas between them that choose how it is built, such as "kdtree,median".
+ * Sets all of *out but tasks; false if the text names none, and *out is left alone. */
+UMB_API bool umb_index_parse(const char *text, umb_index_def *out);
+/* The name that umb_index_parse() reads, with as few words as it takes; "unknown" if there is no such index. */
+UMB_API const char *umb_index_name(const umb_index_def *def);
+/* All the ways to build an index: the k-th name, NULL beyond the last. */
+UMB_API const char *umb_index_variant(uint32_t k);
 
 #ifdef __cplusplus
 }

@@ -195,6 +195,18 @@ static int by_id(const void *a, const void *b)
     return x < y ? -1 : x > y;
 }
 
+/* An object whose parts are in several slots was found several times. */
+static uint32_t once_each(uint32_t *ids, uint32_t count)
+{
+    uint32_t kept = 0;
+    for (uint32_t i = 0; i < count; ++i) {
+        if (kept == 0 || ids[kept - 1] != ids[i]) {
+            ids[kept++] = ids[i];
+        }
+    }
+    return kept;
+}
+
 static double largest(const umb_region_query *q, const umb_tree *tree)
 {
     double reach = 0.0;
@@ -212,7 +224,7 @@ static umb_result prepare(umb_region *region, const umb_region_query *query)
     if (tree->version != c->version) {
         return umb_region_fail(region, UMB_ERROR_STATE, "the index could not follow the last commit");
     }
-    if (!umb_memory_reserve(&region->allocator, (void **)&region->pvs, &region->pvs_capacity, c->object_count,
+    if (!umb_memory_reserve(&region->allocator, (void **)&region->pvs, &region->pvs_capacity, tree->object_count,
                             sizeof *region->pvs) ||
         !umb_memory_reserve(&region->allocator, (void **)&region->refined, &region->refined_capacity,
                             c->object_count, sizeof *region->refined)) {
@@ -254,6 +266,7 @@ umb_result umb_region_solve(umb_region *region, const umb_region_query *query, u
     }
     umb_region_answer *a = &region->answer;
     qsort(region->pvs, a->pvs_count, sizeof *region->pvs, by_id);
+    a->pvs_count = once_each(region->pvs, a->pvs_count);
     a->pvs = region->pvs;
     a->stats.pvs_triangles = sum_triangles(c, a->pvs, a->pvs_count);
     region->solved = true;

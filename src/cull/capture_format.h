@@ -6,7 +6,7 @@
 #include <stdint.h>
 
 #define UMB_CAPTURE_MAGIC "UMBCAP\r\n" /* a transfer as text destroys the line end */
-#define UMB_CAPTURE_VERSION 2u
+#define UMB_CAPTURE_VERSION 3u
 
 /* Sections in the order of the file and the bytes of a record of each. */
 #define UMB_CAPTURE_SECTIONS(X) \
@@ -18,6 +18,7 @@
     X(OBJECTS, 80)              \
     X(OCCLUDERS, 52)            \
     X(NODES, 32)                \
+    X(BOXES, 192)               \
     X(ANSWER, 4)
 
 enum {

@@ -6,6 +6,7 @@
 #include "base/scratch.h"
 #include "capture_format.h"
 #include "culler.h"
+#include "index/index_name.h"
 #include "index/tree.h"
 #include "umbrage/capture.h"
 
@@ -107,7 +108,8 @@ static umb_result check_sections(loader *l)
         end = offset + count * umb_capture_record_bytes(k);
     }
     if (end != l->size || l->counts[UMB_CAPTURE_FRAME] != 1 ||
-        l->counts[UMB_CAPTURE_FLAGS] != l->counts[UMB_CAPTURE_TRIANGLES]) {
+        l->counts[UMB_CAPTURE_FLAGS] != l->counts[UMB_CAPTURE_TRIANGLES] ||
+        (l->counts[UMB_CAPTURE_BOXES] != 0 && l->counts[UMB_CAPTURE_BOXES] != l->counts[UMB_CAPTURE_NODES])) {
         return fail(l, "sections that do not belong together");
     }
     return UMB_OK;
@@ -138,11 +140,10 @@ static umb_result read_frame(loader *l)
     v->far_depth = numbers[5];
     v->min_pixels = numbers[6];
     v->time = numbers[7];
-    if (words[0] > UMB_METHOD_NONE || words[1] > UMB_INDEX_FLAT || words[2] > UMB_ORTHOGRAPHIC) {
+    if (words[0] > UMB_METHOD_NONE || !umb_index_name_unpack(words[1], &l->out->index_def) || words[2] > UMB_ORTHOGRAPHIC) {
         return fail(l, "unknown method, index or projection");
     }
     l->out->method = (umb_method)words[0];
-    l->out->kind = (umb_index_kind)words[1];
     v->projection = (umb_projection)words[2];
     v->width = words[3];
     v->height = words[4];
@@ -274,9 +275,21 @@ static umb_result read_index(loader *l, umb_scratch *scratch)
     for (uint32_t i = 0; i < count * UMB_NODE_WIDTH; ++i) {
         refs[i / UMB_NODE_WIDTH][i % UMB_NODE_WIDTH] = get_word(l);
     }
-    umb_index_def def = {.kind = l->out->kind, .tasks = l->tasks};
-    umb_result result = umb_index_restore(
-        l->out->scene, &def, (const uint32_t(*)[UMB_NODE_WIDTH])refs, count, &l->out->index);
+    float(*boxes)[6][UMB_NODE_WIDTH] = NULL;
+    if (l->counts[UMB_CAPTURE_BOXES] > 0) {
+        boxes = umb_scratch_get(scratch, count, sizeof *boxes);
+        if (boxes == NULL) {
+            return fail_call(l, UMB_ERROR_MEMORY, "index");
+        }
+        l->at = l->sections[UMB_CAPTURE_BOXES];
+        for (size_t i = 0; i < 6 * (size_t)count * UMB_NODE_WIDTH; ++i) {
+            boxes[i / (6 * UMB_NODE_WIDTH)][i / UMB_NODE_WIDTH % 6][i % UMB_NODE_WIDTH] = get_float(l);
+        }
+    }
+    umb_stored_tree stored = {(const uint32_t(*)[UMB_NODE_WIDTH])refs, (const float(*)[6][UMB_NODE_WIDTH])boxes,
+                              count};
+    l->out->index_def.tasks = l->tasks;
+    umb_result result = umb_index_restore(l->out->scene, &l->out->index_def, &stored, &l->out->index);
     return result == UMB_OK ? UMB_OK : fail_call(l, result, "index's nodes");
 }
 

@@ -5,6 +5,7 @@
 #include "base/scratch.h"
 #include "capture_format.h"
 #include "culler.h"
+#include "index/index_name.h"
 #include "index/tree.h"
 #include "umbrage/capture.h"
 
@@ -108,6 +109,7 @@ static void lay_out(saver *s)
     s->counts[UMB_CAPTURE_OCCLUDERS] = s->committed->occluder_count -
                                        s->committed->first_free_occluder;
     s->counts[UMB_CAPTURE_NODES] = s->tree->node_count;
+    s->counts[UMB_CAPTURE_BOXES] = s->tree->several ? s->tree->node_count : 0;
     s->counts[UMB_CAPTURE_ANSWER] = s->answer_count;
     s->size = UMB_CAPTURE_HEADER;
     for (int k = 0; k < UMB_CAPTURE_SECTION_COUNT; ++k) {
@@ -119,6 +121,7 @@ static void lay_out(saver *s)
 static void put_frame(saver *s)
 {
     const umb_view *v = s->view;
+    const umb_index_def index = umb_index_settings(umb_culler_index(s->culler));
     put_doubles(s, umb_scene_origin(s->scene), 3);
     put_doubles(s, v->eye, 3);
     put_doubles(s, v->right, 3);
@@ -133,7 +136,7 @@ static void put_frame(saver *s)
         put_doubles(s, i < v->plane_count ? v->planes[i] : none, 4);
     }
     const uint32_t words[8] = {(uint32_t)umb_culler_settings(s->culler).method,
-                               (uint32_t)umb_index_get_kind(umb_culler_index(s->culler)),
+                               umb_index_name_pack(&index),
                                (uint32_t)v->projection,
                                v->width,
                                v->height,
@@ -184,6 +187,15 @@ static void put_transform(saver *s, const umb_transform *t)
     }
 }
 
+static void put_boxes(saver *s, const umb_node *node)
+{
+    for (int i = 0; i < 6; ++i) {
+        for (int slot = 0; slot < UMB_NODE_WIDTH; ++slot) {
+            put_float(s, i < 3 ? node->min[i][slot] : node->max[i - 3][slot]);
+        }
+    }
+}
+
 static void put_objects(saver *s, uint8_t *bytes)
 {
     const umb_committed *c = s->committed;
@@ -227,6 +239,10 @@ static void put_all(saver *s, uint8_t *bytes)
         for (uint32_t k = 0; k < UMB_NODE_WIDTH; ++k) {
             put_word(s, k < s->tree->nodes[n].count ? s->tree->nodes[n].ref[k] : UMB_NONE);
         }
+    }
+    s->at = bytes + s->offsets[UMB_CAPTURE_BOXES];
+    for (uint32_t n = 0; n < s->counts[UMB_CAPTURE_BOXES]; ++n) {
+        put_boxes(s, &s->tree->nodes[n]);
     }
     s->at = bytes + s->offsets[UMB_CAPTURE_ANSWER];
     for (uint32_t i = 0; i < s->answer_count; ++i) {

@@ -41,6 +41,26 @@ static void ask(umb_chosen *v, umb_query *q)
     }
 }
 
+static bool settle(umb_chosen *v, uint32_t object)
+{
+    return v->once != NULL && umb_once_set(v->once, &v->once->objects[object], UMB_ONCE_SETTLED);
+}
+
+/* Parts, for in_view(): true if there is something to ask about. */
+static bool wants_part(umb_chosen *v, uint32_t ref)
+{
+    const umb_choice *c = v->choice;
+    if ((ref & UMB_REF_KIND) != UMB_REF_OBJECT) {
+        return true;
+    }
+    uint32_t object = ref & UMB_REF_NUMBER, *entry = &v->once->objects[object];
+    c->stats->in_frustum += !umb_once_set(v->once, entry, UMB_ONCE_MET);
+    if (c->view->min_pixels > 0.0 && umb_contribution_small(c->view, &c->scene->objects[object].bounds)) {
+        c->stats->small += !umb_once_set(v->once, entry, UMB_ONCE_SETTLED);
+    }
+    return !umb_once_has(v->once, *entry, UMB_ONCE_SETTLED);
+}
+
 /* Boxes of a node that hold objects and are in view, and large enough. */
 static uint32_t in_view(umb_chosen *v, const umb_node *node, const umb_chosen_node *at, uint16_t *planes)
 {
@@ -54,6 +74,10 @@ static uint32_t in_view(umb_chosen *v, const umb_node *node, const umb_chosen_no
     for (; in != 0; in &= in - 1) {
         uint32_t slot = (uint32_t)__builtin_ctz(in), kind = node->ref[slot] & UMB_REF_KIND;
         if (kind == UMB_REF_OCCLUDER) {
+            continue;
+        }
+        if (v->once != NULL) {
+            found |= wants_part(v, node->ref[slot]) ? 1u << slot : 0;
             continue;
         }
         c->stats->in_frustum += kind == UMB_REF_OBJECT;
@@ -83,7 +107,7 @@ static void open_node(umb_chosen *v, const umb_chosen_node *at, uint32_t *waitin
             v->room->nodes[(*waiting)++] = (umb_chosen_node){number, q.tokens[slot], planes[slot]};
         } else if (object_hidden(v, number, q.tokens[slot])) {
             v->choice->stats->hidden_objects += 1;
-        } else {
+        } else if (!settle(v, number)) {
             float key = v->projector != NULL ? projected.w_min[slot] : 0.0f;
             v->entries[v->count++] = umb_found_entry(key, number, planes[slot] == 0);
         }

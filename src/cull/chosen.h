@@ -3,8 +3,8 @@
 #ifndef UMB_CHOSEN_H
 #define UMB_CHOSEN_H
 
-#include "frustum/box_kernels.h"
 #include "occlusion/method.h"
+#include "once.h"
 
 /* A node that waits: its planes that boxes may cross, and the token of its box. */
 typedef struct umb_chosen_node {
@@ -27,6 +27,7 @@ typedef struct umb_chosen {
     umb_chosen_room *room;
     uint8_t *remember; /* of umb_frustum_test_node(), a byte for each node and block */
     uint64_t *entries; /* found.h; room for all objects */
+    umb_once *once;    /* NULL: each item has one slot. Else umb_once_finish() is to follow */
     uint32_t count;    /* filled in */
 } umb_chosen;
 

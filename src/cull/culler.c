@@ -29,6 +29,7 @@
 #include "index/tree.h"
 #include "occlusion/image.h"
 #include "occlusion/method.h"
+#include "once.h"
 #include "past.h"
 
 /* Images of boxes whose shorter side, in pixels beyond the first, is less than this cover nothing worth having: a
@@ -56,6 +57,7 @@ struct umb_culler {
     uint8_t *planes; /* per node: the plane that all its boxes failed last time (plane coherency) */
     size_t found_capacity, scratch_capacity, object_capacity, inside_capacity, plane_capacity, row_capacity;
     umb_past past;
+    umb_once once;
     uint32_t count;
     bool answered;
     umb_view view;    /* of the last answer */
@@ -71,6 +73,7 @@ typedef struct walk {
     umb_raster_map map;
     umb_projector projector;
     const umb_view *view;
+    umb_once *once; /* NULL: each item has one slot */
     float most_w;
     uint32_t drawn;
     umb_cull_stats stats;
@@ -132,6 +135,7 @@ void umb_culler_destroy(umb_culler *c)
     }
     umb_heap_free(&c->heap, &a);
     umb_past_free(&c->past, &a);
+    umb_once_free(&c->once, &a);
     umb_in_view_free(&c->room, &a);
     umb_chosen_free(&c->chosen_room, &a);
     umb_memory_free(&a, c->found, c->found_capacity * sizeof *c->found);
@@ -155,7 +159,7 @@ static bool reserve_answer(umb_culler *c, const umb_tree *tree)
            umb_memory_reserve(a, (void **)&c->inside, &c->inside_capacity, count, 1);
 }
 
-/* Everything that a walk can need, so that it never allocates: each item and node waits at most
+/* Everything that a walk can need, so that it never allocates: each slot and node waits at most
  * once, and occluders drawn early are gone before the walk begins. */
 static bool reserve(umb_culler *c, const umb_view *view, const umb_tree *tree, const umb_committed *scene)
 {
@@ -166,6 +170,7 @@ static bool reserve(umb_culler *c, const umb_view *view, const umb_tree *tree, c
     size_t waiting = (size_t)tree->item_count + tree->node_count, early = scene->occluder_count;
     if (!umb_memory_reserve(a, (void **)&c->rows, &c->row_capacity, umb_raster_map_table(height),
                             sizeof *c->rows) ||
+        (tree->several && !umb_once_begin(&c->once, a, scene)) ||
         (c->ops != NULL && !chooses(c) && !umb_heap_reserve(&c->heap, a, waiting > early ? waiting : early)) ||
         (chooses(c) && !umb_chosen_reserve(&c->chosen_room, a, tree)) ||
         (c->ops == NULL && !umb_in_view_reserve(&c->room, a, tree)) || !reserve_answer(c, tree) ||
@@ -201,11 +206,24 @@ static void count_hidden(walk *w, uint32_t ref)
     w->stats.hidden_objects += kind == UMB_REF_OBJECT;
 }
 
+/* An object in parts is as large as all of it, and a node of parts says nothing. */
+static bool whole_too_small(walk *w, uint32_t object)
+{
+    bool small = umb_contribution_small(w->view, &w->scene->objects[object].bounds);
+    if (small && !umb_once_set(w->once, &w->once->objects[object], UMB_ONCE_SETTLED)) {
+        w->stats.small += 1;
+    }
+    return small;
+}
+
 static bool too_small(walk *w, const umb_node *node, uint32_t slot)
 {
     uint32_t kind = node->ref[slot] & UMB_REF_KIND;
     if (!(w->view->min_pixels > 0.0) || kind == UMB_REF_OCCLUDER) {
         return false;
+    }
+    if (w->once != NULL) {
+        return kind == UMB_REF_OBJECT && whole_too_small(w, node->ref[slot] & UMB_REF_NUMBER);
     }
     bool small = umb_contribution_small_slot(w->view, node, slot);
     w->stats.small += small && kind == UMB_REF_OBJECT;
@@ -312,6 +330,19 @@ static uint32_t ask_by_neighbours(walk *w, const umb_projected *projected, uint3
     return hides | found;
 }
 
+/* Count what is in the frustum. False if nothing is left to do about it. */
+static bool meet(walk *w, uint32_t ref)
+{
+    bool object = (ref & UMB_REF_KIND) == UMB_REF_OBJECT;
+    if (!object || w->once == NULL) {
+        w->stats.in_frustum += object;
+        return true;
+    }
+    uint32_t *entry = &w->once->objects[ref & UMB_REF_NUMBER];
+    w->stats.in_frustum += !umb_once_set(w->once, entry, UMB_ONCE_MET);
+    return !umb_once_has(w->once, *entry, UMB_ONCE_SETTLED);
+}
+
 /* Test eight boxes and have those wait that may be seen. */
 static void open_boxes(walk *w, opening *o)
 {
@@ -337,7 +368,9 @@ static void open_boxes(walk *w, opening *o)
     }
     for (; left != 0; left &= left - 1) {
         uint32_t slot = (uint32_t)__builtin_ctz(left), ref = boxes->ref[slot];
-        w->stats.in_frustum += (ref & UMB_REF_KIND) == UMB_REF_OBJECT;
+        if (!meet(w, ref)) {
+            continue;
+        }
         if ((hides >> slot & 1u) != 0) {
             count_hidden(w, ref);
         } else if (!too_small(w, boxes, slot)) {
@@ -382,12 +415,16 @@ static bool is_idle(walk *w, uint32_t occluder, const umb_waiting *item)
 static void draw(walk *w, uint32_t occluder, const umb_waiting *item)
 {
     const umb_culler *c = w->culler;
-    if (c->ops == NULL || occluder == UMB_NONE) {
+    if (c->ops == NULL || occluder == UMB_NONE ||
+        (w->once != NULL && umb_once_has(w->once, w->once->occluders[occluder], UMB_ONCE_DRAWN))) {
         return;
     }
     if (is_idle(w, occluder, item)) {
         w->stats.idle += 1;
         return;
+    }
+    if (w->once != NULL) {
+        umb_once_set(w->once, &w->once->occluders[occluder], UMB_ONCE_DRAWN);
     }
     umb_past *past = &w->culler->past;
     const umb_mesh *mesh = w->scene->occluders[occluder].mesh;
@@ -416,11 +453,26 @@ static void draw(walk *w, uint32_t occluder, const umb_waiting *item)
     }
 }
 
+/* Nothing more is to be found out about an object in this frame. */
+static void settle(walk *w, uint32_t object)
+{
+    if (w->once != NULL) {
+        umb_once_set(w->once, &w->once->objects[object], UMB_ONCE_SETTLED);
+    }
+}
+
+static bool is_settled(const walk *w, uint32_t ref)
+{
+    return w->once != NULL && (ref & UMB_REF_KIND) == UMB_REF_OBJECT &&
+           umb_once_has(w->once, w->once->objects[ref & UMB_REF_NUMBER], UMB_ONCE_SETTLED);
+}
+
 static void report(walk *w, const umb_waiting *item)
 {
     umb_culler *c = w->culler;
     uint32_t id = item->ref & UMB_REF_NUMBER;
     c->found[c->count++] = umb_found_entry(item->nearest, id, item->planes == 0);
+    settle(w, id);
     if (umb_past_knows(&c->past)) {
         umb_past_saw(&c->past, w->tree, id, item->node);
     }
@@ -469,6 +521,9 @@ static bool visit_object(walk *w, umb_waiting *item, const umb_heap_entry *entry
     item->waited = true;
     if (ask && !object_shows(w, o, item)) {
         w->stats.hidden_objects += 1;
+        if (umb_detail_of(o) == UMB_DETAIL_PARTS) { /* all of its shape was asked about, not what is in one box */
+            settle(w, item->ref & UMB_REF_NUMBER);
+        }
         return false;
     }
     if (first) {
@@ -504,7 +559,9 @@ static void run_queue(walk *w)
         umb_heap_entry entry = umb_heap_pop(heap);
         umb_waiting *item = &heap->slots[entry.slot];
         bool waits = false;
-        if (found_hidden(w, item)) {
+        if (is_settled(w, item->ref)) {
+            waits = false;
+        } else if (found_hidden(w, item)) {
             count_hidden(w, item->ref);
         } else if ((item->ref & UMB_REF_KIND) == UMB_REF_NODE) {
             open_node(w, item->ref & UMB_REF_NUMBER, item->planes);
@@ -605,6 +662,7 @@ static void prepare_walk(walk *w, umb_culler *c, const umb_view *view)
 {
     w->culler = c;
     w->view = view;
+    w->once = w->tree->several ? &c->once : NULL;
     w->drawn = 0;
     w->stats = (umb_cull_stats){0};
     umb_frustum_prepare(&w->frustum, view);
@@ -630,6 +688,8 @@ static void find_in_view(walk *w)
                      .inside = c->inside,
                      .entries = c->def.unordered ? NULL : c->found,
                      .projector = &w->projector,
+                     .scene = w->scene,
+                     .once = w->once,
                      .stats = &w->stats};
     umb_in_view_find(&v);
     c->count = v.count;
@@ -670,11 +730,28 @@ static umb_result find_chosen(walk *w)
                          .kernels = c->kernels,
                          .projector = &w->projector,
                          .room = &c->chosen_room,
+                         .once = w->once,
                          .remember = c->planes,
                          .entries = c->found};
     umb_chosen_find(&chosen);
     c->count = chosen.count;
     return UMB_OK;
+}
+
+/* What was found in parts, as whole objects. */
+static void make_whole(walk *w)
+{
+    umb_culler *c = w->culler;
+    umb_once_view v = {w->scene, &w->frustum, c->kernels, &w->projector};
+    bool sorted = c->ops != NULL || !c->def.unordered;
+    for (uint32_t i = 0; i < c->count && c->ops != NULL; ++i) {
+        c->objects[i] = umb_found_id(c->found[i]);
+    }
+    c->count = umb_once_finish(&v, c->objects, c->count, sorted ? c->found : NULL, c->objects, c->inside);
+    if (c->ops == NULL) {
+        w->stats.in_frustum = w->stats.small + c->count;
+    }
+    w->stats.hidden_objects = w->stats.in_frustum - w->stats.small - c->count;
 }
 
 /* The entries found, in order if asked for, as ids and flags. */
@@ -721,6 +798,9 @@ umb_result umb_cull(umb_culler *c, const umb_view *view, umb_visible_set *out)
         }
     } else if (c->ops == NULL) {
         find_in_view(&w);
+    }
+    if (w.once != NULL) {
+        make_whole(&w);
     }
     if (c->ops != NULL || !c->def.unordered) {
         write_answer(c);

@@ -36,10 +36,24 @@ static inline __attribute__((always_inline)) void fetch(const umb_tree *tree, ui
     }
 }
 
+/* A part of an object. */
+static void find_part(umb_in_view *v, uint32_t object)
+{
+    if (!umb_once_set(v->once, &v->once->objects[object], UMB_ONCE_SETTLED)) {
+        v->objects[v->count++] = object;
+    }
+}
+
 /* Everything below a node. */
 static void copy_range(umb_in_view *v, uint32_t node)
 {
     umb_range range = v->tree->below[node];
+    for (uint32_t i = 0; i < range.count && v->once != NULL; ++i) {
+        find_part(v, v->tree->objects[range.first + i]);
+    }
+    if (v->once != NULL) {
+        return;
+    }
     const uint32_t *from = v->tree->objects + range.first;
     uint32_t *to = v->objects + v->count;
     uint8_t *inside = v->inside + v->count;
@@ -51,10 +65,20 @@ static void copy_range(umb_in_view *v, uint32_t node)
     v->stats->in_frustum += range.count;
 }
 
+/* A part says nothing of the size of its object, nor does a node of parts. */
+static void find_part_of_size(umb_in_view *v, uint32_t object)
+{
+    if (!umb_contribution_small(v->view, &v->scene->objects[object].bounds)) {
+        find_part(v, object);
+    } else if (!umb_once_set(v->once, &v->once->objects[object], UMB_ONCE_SETTLED)) {
+        v->stats->small += 1;
+    }
+}
+
 /* One node or block: what is found is written, nodes below it wait behind the *waiting that do. */
 static void open_node(umb_in_view *v, const umb_node *node, uint16_t planes, uint8_t *remember, uint32_t *waiting)
 {
-    bool sizes = v->view->min_pixels > 0.0, whole = v->entries == NULL && !sizes;
+    bool sizes = v->view->min_pixels > 0.0, parts = v->once != NULL, whole = (v->entries == NULL || parts) && !sizes;
     uint16_t left[UMB_NODE_WIDTH] = {0};
     uint32_t in = (1u << node->count) - 1u;
     v->stats->nodes += 1;
@@ -63,7 +87,7 @@ static void open_node(umb_in_view *v, const umb_node *node, uint16_t planes, uin
         in &= ~umb_frustum_test_node(&v->frustum, v->kernels, node, planes, remember, left);
     }
     umb_projected projected;
-    if (v->entries != NULL && in != 0) {
+    if (v->entries != NULL && in != 0 && !parts) {
         v->kernels->project(node, v->projector, &projected);
     }
     for (; in != 0; in &= in - 1) {
@@ -71,7 +95,9 @@ static void open_node(umb_in_view *v, const umb_node *node, uint16_t planes, uin
         uint32_t kind = ref & UMB_REF_KIND;
         if (kind == UMB_REF_NODE && whole && left[slot] == 0) {
             copy_range(v, number);
-        } else if (sizes && kind != UMB_REF_OCCLUDER && umb_contribution_small_slot(v->view, node, slot)) {
+        } else if (parts && kind == UMB_REF_OBJECT) {
+            sizes ? find_part_of_size(v, number) : find_part(v, number);
+        } else if (sizes && !parts && kind != UMB_REF_OCCLUDER && umb_contribution_small_slot(v->view, node, slot)) {
             v->stats->in_frustum += kind == UMB_REF_OBJECT;
             v->stats->small += kind == UMB_REF_OBJECT;
         } else if (kind == UMB_REF_NODE) {

@@ -2,8 +2,7 @@
 #ifndef UMB_IN_VIEW_H
 #define UMB_IN_VIEW_H
 
-#include "frustum/box_kernels.h"
-#include "umbrage/cull.h"
+#include "once.h"
 
 /* A node and the planes that its contents may cross. */
 typedef struct umb_in_view_node {
@@ -31,6 +30,9 @@ typedef struct umb_in_view {
     uint8_t *inside;
     uint64_t *entries;
     const umb_projector *projector;
+    /* Where once is not NULL ids alone are written, to objects, each once: umb_once_finish() does the rest. */
+    const umb_committed *scene;
+    umb_once *once;
     uint32_t count;
     umb_cull_stats *stats;
 } umb_in_view;

@@ -1,11 +1,11 @@
 /* The wide half of the build, and refitting. */
-#include "bvh.h"
+#include "cells.h"
 
 #include <string.h>
 
 /* ---- nodes ---------------------------------------------------------------------------------- */
 
-static void set_slot(umb_node *node, uint32_t slot, const float min[3], const float max[3],
+static inline void set_slot(umb_node *node, uint32_t slot, const float min[3], const float max[3],
                      uint32_t ref)
 {
     for (int i = 0; i < 3; ++i) {
@@ -64,51 +64,85 @@ umb_aabb umb_node_bounds(const umb_node *node)
 typedef struct emitter {
     const umb_bvh_item *items;
     const umb_bvh_split *splits;
+    const umb_cell_cut *cuts; /* NULL: no orders */
     umb_node *nodes;
+    umb_order *orders;
     uint32_t next;
 } emitter;
 
-/* Append to slots what stands for a subtree in at most j slots. */
-static uint32_t gather(const umb_bvh_split *splits, uint32_t node, int j, uint32_t slots[],
-                       uint32_t count)
+/* The slots of one wide node while they are gathered. */
+typedef struct opened {
+    uint32_t slots[UMB_NODE_WIDTH];
+    uint32_t count, split_count;
+    const umb_cell_cut *cuts;
+    umb_order *order; /* NULL: not wanted */
+} opened;
+
+static uint8_t gather(opened *o, const umb_bvh_split *splits, uint32_t node, int j);
+
+/* The two halves of a split, left in so many slots and right in so many, and how they are in order. Splits without a
+ * plane are within one cell, and so is all below them. */
+static uint8_t gather_halves(opened *o, const umb_bvh_split *splits, uint32_t node, int left, int right)
 {
-    if (node & UMB_BVH_ITEM) {
-        slots[count] = node;
-        return count + 1;
-    }
     const umb_bvh_split *s = &splits[node];
-    while (j > 1 && s->pick[j - 1] == 0) {
-        --j;
+    umb_order *order = o->order;
+    if (order == NULL || o->cuts[node].axis == UMB_CELL_NO_PLANE) {
+        gather(o, splits, s->left, left);
+        gather(o, splits, s->right, right);
+        return UMB_ORDER_END;
     }
-    if (j == 1) {
-        slots[count] = node;
-        return count + 1;
+    uint32_t k = o->split_count++;
+    const umb_cell_cut *cut = &o->cuts[node];
+    order->kind = UMB_ORDER_PLANES;
+    order->axis[k] = cut->axis;
+    if (cut->axis == UMB_ORDER_TILTED) {
+        order->number[k] = cut->number;
+    } else {
+        order->at[k] = cut->at;
     }
-    count = gather(splits, s->left, s->pick[j - 1], slots, count);
-    return gather(splits, s->right, j - s->pick[j - 1], slots, count);
+    order->next[k][0] = gather(o, splits, s->left, left);
+    order->middle[k] = (uint8_t)o->count;
+    order->next[k][1] = gather(o, splits, s->right, right);
+    return (uint8_t)k;
+}
+
+/* Append to the slots what stands for a subtree in at most j of them. Returns the split that orders them. */
+static uint8_t gather(opened *o, const umb_bvh_split *splits, uint32_t node, int j)
+{
+    if ((node & UMB_BVH_ITEM) == 0) {
+        const umb_bvh_split *s = &splits[node];
+        while (j > 1 && s->pick[j - 1] == 0) {
+            --j;
+        }
+        if (j > 1) {
+            return gather_halves(o, splits, node, s->pick[j - 1], j - s->pick[j - 1]);
+        }
+    }
+    o->slots[o->count++] = node;
+    return UMB_ORDER_END;
 }
 
 /* The slots of the wide node at a subtree's root. */
-static uint32_t open_node(const umb_bvh_split *splits, uint32_t node, uint32_t slots[UMB_NODE_WIDTH])
+static void open_node(opened *o, const umb_bvh_split *splits, uint32_t node)
 {
     if (node & UMB_BVH_ITEM) {
-        slots[0] = node;
-        return 1;
+        o->slots[o->count++] = node;
+        return;
     }
-    const umb_bvh_split *s = &splits[node];
-    int left = s->pick[UMB_NODE_WIDTH - 1];
-    uint32_t count = gather(splits, s->left, left, slots, 0);
-    return gather(splits, s->right, UMB_NODE_WIDTH - left, slots, count);
+    int left = splits[node].pick[UMB_NODE_WIDTH - 1];
+    gather_halves(o, splits, node, left, UMB_NODE_WIDTH - left);
 }
 
-static uint32_t count_nodes(const umb_bvh_split *splits, uint32_t node)
+static uint32_t count_nodes(const umb_bvh_split *splits, uint32_t node, uint32_t *slots)
 {
-    uint32_t slots[UMB_NODE_WIDTH];
-    uint32_t count = open_node(splits, node, slots);
+    opened o = {.count = 0};
+    open_node(&o, splits, node);
     uint32_t total = 1;
-    for (uint32_t i = 0; i < count; ++i) {
-        if ((slots[i] & UMB_BVH_ITEM) == 0) {
-            total += count_nodes(splits, slots[i]);
+    for (uint32_t i = 0; i < o.count; ++i) {
+        if ((o.slots[i] & UMB_BVH_ITEM) == 0) {
+            total += count_nodes(splits, o.slots[i], slots);
+        } else {
+            *slots += 1;
         }
     }
     return total;
@@ -116,23 +150,24 @@ static uint32_t count_nodes(const umb_bvh_split *splits, uint32_t node)
 
 static void emit(emitter *e, uint32_t split, uint32_t number, uint32_t parent)
 {
-    uint32_t slots[UMB_NODE_WIDTH];
+    opened o = {.cuts = e->cuts, .order = e->orders != NULL ? &e->orders[number] : NULL};
     umb_node *node = &e->nodes[number];
     memset(node, 0, sizeof(*node));
     node->parent = parent;
-    node->count = open_node(e->splits, split, slots);
+    open_node(&o, e->splits, split);
+    node->count = o.count;
     for (uint32_t i = 0; i < node->count; ++i) {
-        if (slots[i] & UMB_BVH_ITEM) {
-            const umb_bvh_item *item = &e->items[slots[i] & ~UMB_BVH_ITEM];
+        if (o.slots[i] & UMB_BVH_ITEM) {
+            const umb_bvh_item *item = &e->items[o.slots[i] & ~UMB_BVH_ITEM];
             set_slot(node, i, item->min, item->max, item->ref);
         } else {
             node->ref[i] = UMB_REF_NODE | e->next++;
         }
     }
     for (uint32_t i = 0; i < node->count; ++i) {
-        if ((slots[i] & UMB_BVH_ITEM) == 0) {
+        if ((o.slots[i] & UMB_BVH_ITEM) == 0) {
             uint32_t child = node->ref[i];
-            emit(e, slots[i], child, number);
+            emit(e, o.slots[i], child, number);
             e->nodes[child].slot = i;
             umb_aabb box = umb_node_bounds(&e->nodes[child]);
             set_slot(node, i, box.min, box.max, child);
@@ -141,11 +176,46 @@ static void emit(emitter *e, uint32_t split, uint32_t number, uint32_t parent)
     umb_node_pad(node);
 }
 
-umb_result umb_bvh_build(const umb_allocator *a, const umb_tasks *tasks, umb_bvh_item *items,
-                         uint32_t count, umb_node **nodes, uint32_t *node_count)
+static size_t order_bytes(const umb_built *built)
 {
-    *nodes = NULL;
-    *node_count = 0;
+    return built->orders != NULL ? built->node_count * sizeof(umb_order) : 0;
+}
+
+void umb_built_free(umb_built *built, const umb_allocator *a)
+{
+    umb_memory_free(a, built->nodes, built->node_count * sizeof(umb_node));
+    umb_memory_free(a, built->orders, order_bytes(built));
+    umb_memory_free(a, built->planes, built->plane_count * sizeof(umb_tilted_plane));
+    *built = (umb_built){0};
+}
+
+size_t umb_built_memory(const umb_built *built)
+{
+    return built->node_count * sizeof(umb_node) + order_bytes(built) + built->plane_count * sizeof(umb_tilted_plane);
+}
+
+umb_result umb_bvh_lay_out(const umb_allocator *a, const umb_bvh_item *items, const umb_bvh_split *splits,
+                           uint32_t root, const umb_cell_cut *cuts, umb_built *out)
+{
+    *out = (umb_built){0};
+    out->node_count = count_nodes(splits, root, &out->slot_count);
+    out->nodes = umb_memory_allocate(a, out->node_count * sizeof(umb_node));
+    if (cuts != NULL) {
+        out->orders = umb_memory_allocate_zero(a, out->node_count, sizeof(umb_order));
+    }
+    if (out->nodes == NULL || (cuts != NULL && out->orders == NULL)) {
+        umb_built_free(out, a);
+        return UMB_ERROR_MEMORY;
+    }
+    emitter e = {items, splits, cuts, out->nodes, out->orders, 1};
+    emit(&e, root, 0, UMB_NONE);
+    return UMB_OK;
+}
+
+umb_result umb_bvh_build(const umb_allocator *a, const umb_tasks *tasks, umb_bvh_item *items,
+                         uint32_t count, umb_built *out)
+{
+    *out = (umb_built){0};
     size_t bytes = (size_t)count * sizeof(umb_bvh_split);
     umb_bvh_split *splits = umb_memory_allocate(a, bytes);
     if (splits == NULL) {
@@ -154,15 +224,7 @@ umb_result umb_bvh_build(const umb_allocator *a, const umb_tasks *tasks, umb_bvh
     uint32_t root;
     umb_result result = umb_bvh_split_items(a, tasks, items, count, splits, &root);
     if (result == UMB_OK) {
-        uint32_t total = count_nodes(splits, root);
-        emitter e = {items, splits, umb_memory_allocate(a, total * sizeof(umb_node)), 1};
-        if (e.nodes != NULL) {
-            emit(&e, root, 0, UMB_NONE);
-            *nodes = e.nodes;
-            *node_count = total;
-        } else {
-            result = UMB_ERROR_MEMORY;
-        }
+        result = umb_bvh_lay_out(a, items, splits, root, NULL, out);
     }
     umb_memory_free(a, splits, bytes);
     return result;
@@ -196,7 +258,7 @@ void umb_bvh_refit(umb_node *nodes, uint32_t node_count, const umb_committed *sc
 }
 
 void umb_bvh_find_places(const umb_node *nodes, uint32_t node_count, uint32_t *places,
-                         uint32_t object_count)
+                         uint32_t object_count, uint32_t *next)
 {
     for (uint32_t i = 0; i < object_count; ++i) {
         places[i] = UMB_NONE;
@@ -205,6 +267,9 @@ void umb_bvh_find_places(const umb_node *nodes, uint32_t node_count, uint32_t *p
         for (uint32_t slot = 0; slot < nodes[k].count; ++slot) {
             uint32_t ref = nodes[k].ref[slot];
             if ((ref & UMB_REF_KIND) == UMB_REF_OBJECT) {
+                if (next != NULL) {
+                    next[k * UMB_NODE_WIDTH + slot] = places[ref & UMB_REF_NUMBER];
+                }
                 places[ref & UMB_REF_NUMBER] = k * UMB_NODE_WIDTH + slot;
             }
         }
@@ -282,12 +347,6 @@ void umb_bvh_marks_free(umb_bvh_marks *marks, const umb_allocator *a)
     *marks = (umb_bvh_marks){0};
 }
 
-static inline void mark(const umb_bvh_marks *marks, uint32_t node)
-{
-    marks->nodes[node >> 6] |= (uint64_t)1 << (node & 63);
-    marks->words[node >> 12] |= (uint64_t)1 << (node >> 6 & 63);
-}
-
 static inline uint32_t highest(uint64_t word)
 {
     return 63 - (uint32_t)__builtin_clzll(word);
@@ -321,7 +380,7 @@ static inline void lift(umb_node *nodes, const umb_bvh_marks *marks, uint32_t nu
         parent->max[i][slot] = high;
     }
     if (changed != 0) {
-        mark(marks, node->parent);
+        umb_bvh_mark(marks, node->parent);
     }
 }
 
@@ -362,7 +421,7 @@ void umb_bvh_refit_moved(umb_node *nodes, umb_bvh_marks *marks, const uint32_t *
             umb_node *node = &nodes[place / UMB_NODE_WIDTH];
             uint32_t slot = place % UMB_NODE_WIDTH;
             set_slot(node, slot, box->min, box->max, node->ref[slot]);
-            mark(marks, place / UMB_NODE_WIDTH);
+            umb_bvh_mark(marks, place / UMB_NODE_WIDTH);
         }
     }
     lift_all(nodes, marks);

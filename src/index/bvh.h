@@ -13,19 +13,30 @@ typedef struct umb_bvh_item {
     uint32_t ref; /* UMB_REF_OBJECT or UMB_REF_OCCLUDER */
 } umb_bvh_item;
 
-/* Build over count >= 1 items, whose order it changes. *nodes is allocated with a (*node_count
- * entries) and laid out parents first, siblings side by side. The tree depends on items and their
- * order alone, never on tasks. UMB_ERROR_MEMORY leaves nothing behind. */
+/* What a builder makes: nodes, laid out parents first, siblings side by side. The arrays are their new owner's. */
+typedef struct umb_built {
+    umb_node *nodes;
+    umb_order *orders; /* one a node, or NULL */
+    umb_tilted_plane *planes;
+    uint32_t node_count, slot_count, plane_count; /* slot_count: slots that name items */
+} umb_built;
+
+void umb_built_free(umb_built *built, const umb_allocator *a);
+size_t umb_built_memory(const umb_built *built);
+
+/* Build over count >= 1 items, whose order it changes. The tree depends on items and their order alone, never on
+ * tasks. UMB_ERROR_MEMORY leaves nothing behind. */
 umb_result umb_bvh_build(const umb_allocator *a, const umb_tasks *tasks, umb_bvh_item *items,
-                         uint32_t count, umb_node **nodes, uint32_t *node_count);
+                         uint32_t count, umb_built *out);
 
 /* Put the committed boxes into the slots again, leaves to root; the structure stays. */
 void umb_bvh_refit(umb_node *nodes, uint32_t node_count, const umb_committed *scene);
 
-/* Where each object is: 8 * node + slot; UMB_NONE for those in no node. places has object_count
- * entries. */
+/* Where each object is: 8 * node + slot; UMB_NONE for those in no node. places has object_count entries. Where objects
+ * may be in several slots, next has eight entries a node, and from the first place of an object on leads through the
+ * others to UMB_NONE; else it is NULL. */
 void umb_bvh_find_places(const umb_node *nodes, uint32_t node_count, uint32_t *places,
-                         uint32_t object_count);
+                         uint32_t object_count, uint32_t *next);
 
 /* Lay out the objects in the order of a walk, so that those below each node are side by side. objects has room for
  * all of them and UMB_TREE_SPARE more, below node_count entries. Nodes without a parent come one after the other.
@@ -43,6 +54,12 @@ typedef struct umb_bvh_marks {
 umb_result umb_bvh_marks_create(umb_bvh_marks *marks, const umb_allocator *a, uint32_t node_count);
 void umb_bvh_marks_free(umb_bvh_marks *marks, const umb_allocator *a);
 size_t umb_bvh_marks_memory(const umb_bvh_marks *marks);
+
+static inline void umb_bvh_mark(const umb_bvh_marks *marks, uint32_t node)
+{
+    marks->nodes[node >> 6] |= (uint64_t)1 << (node & 63);
+    marks->words[node >> 12] |= (uint64_t)1 << (node >> 6 & 63);
+}
 
 /* The same as umb_bvh_refit() when only the committed `moved` objects moved: from these up, as far
  * as boxes change, each node once. Costs nothing for nodes that stay as they are. */
@@ -68,5 +85,14 @@ typedef struct umb_bvh_split {
  * 1. */
 umb_result umb_bvh_split_items(const umb_allocator *a, const umb_tasks *tasks, umb_bvh_item *items,
                                uint32_t count, umb_bvh_split *splits, uint32_t *root);
+/* The same for a run of items, but without picks. Returns the root. */
+uint32_t umb_bvh_split_run(umb_bvh_item *items, uint32_t first, uint32_t end, umb_bvh_split *splits);
+
+struct umb_cell_cut;
+
+/* Lay out a binary tree in the wide nodes that its picks say. cuts: of each split (cells.h); then orders are made, too,
+ * else they are NULL. */
+umb_result umb_bvh_lay_out(const umb_allocator *a, const umb_bvh_item *items, const umb_bvh_split *splits,
+                           uint32_t root, const struct umb_cell_cut *cuts, umb_built *out);
 
 #endif

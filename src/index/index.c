@@ -1,12 +1,18 @@
 /* Indices: creation by kind, and following the scene from commit to commit. */
+#include <math.h>
 #include <string.h>
 
 #include "bvh.h"
+#include "cut.h"
+#include "index_name.h"
+#include "kdtree.h"
+#include "parts.h"
 
 struct umb_index {
     umb_tree tree;
-    umb_node *nodes;  /* what tree.nodes points at */
+    umb_built built;  /* what tree.nodes, orders and planes point at */
     uint32_t *places; /* of each object (umb_bvh_find_places) */
+    uint32_t *next;   /* places of objects that have several */
     umb_bvh_marks marks;
     uint32_t *objects; /* what tree.objects, below and blocks point at */
     umb_range *below;
@@ -14,12 +20,12 @@ struct umb_index {
     umb_scene *scene;
     umb_scene_listener listener;
     umb_allocator allocator;
-    umb_tasks tasks;
-    umb_index_kind kind;
+    umb_index_def def;
     /* The state of the scene that the structure was built from: refitting needs all four
      * unchanged. */
     uint64_t structure;
     uint32_t object_count, first_free_occluder, occluder_count;
+    uint32_t item_count; /* objects and occluders in it, each once */
 };
 
 /* ---- items ---------------------------------------------------------------------------------- */
@@ -59,8 +65,7 @@ static void gather_items(const umb_committed *c, umb_bvh_item *items)
 }
 
 /* Rows of eight items in the order given; no hierarchy. */
-static umb_result build_flat(const umb_allocator *a, const umb_bvh_item *items, uint32_t count,
-                             umb_node **nodes, uint32_t *node_count)
+static umb_result build_flat(const umb_allocator *a, const umb_bvh_item *items, uint32_t count, umb_built *out)
 {
     uint32_t rows = count / UMB_NODE_WIDTH + (count % UMB_NODE_WIDTH != 0);
     umb_node *list = umb_memory_allocate_zero(a, rows, sizeof(umb_node));
@@ -80,9 +85,21 @@ static umb_result build_flat(const umb_allocator *a, const umb_bvh_item *items, 
         list[k].parent = UMB_NONE;
         umb_node_pad(&list[k]);
     }
-    *nodes = list;
-    *node_count = rows;
+    *out = (umb_built){.nodes = list, .node_count = rows, .slot_count = count};
     return UMB_OK;
+}
+
+static umb_result build(const umb_index *index, umb_bvh_item *items, uint32_t count, umb_built *out)
+{
+    const umb_allocator *a = &index->allocator;
+    switch (index->def.kind) {
+    case UMB_INDEX_FLAT:
+        return build_flat(a, items, count, out);
+    case UMB_INDEX_KDTREE:
+        return umb_kdtree_build(a, index->def.rule, items, count, out);
+    default:
+        return umb_bvh_build(a, &index->def.tasks, items, count, out);
+    }
 }
 
 /* ---- following the scene -------------------------------------------------------------------- */
@@ -159,13 +176,13 @@ static void settle(umb_index *index)
 
 /* Bytes of what goes with the nodes. */
 typedef struct sizes {
-    size_t nodes, places, objects, below, blocks;
+    size_t places, next, objects, below, blocks;
 } sizes;
 
 static sizes sizes_of(const umb_tree *tree, uint32_t object_count)
 {
-    return (sizes){.nodes = tree->node_count * sizeof(umb_node),
-                   .places = object_count * sizeof(uint32_t),
+    return (sizes){.places = object_count * sizeof(uint32_t),
+                   .next = tree->several ? (size_t)tree->node_count * UMB_NODE_WIDTH * sizeof(uint32_t) : 0,
                    .objects = ((size_t)tree->item_count + UMB_TREE_SPARE) * sizeof(uint32_t),
                    .below = ((size_t)tree->node_count + tree->block_count) * sizeof(umb_range),
                    .blocks = tree->block_count * sizeof(umb_node)};
@@ -175,8 +192,9 @@ static void drop(umb_index *index)
 {
     const umb_allocator *a = &index->allocator;
     sizes s = sizes_of(&index->tree, index->object_count);
-    umb_memory_free(a, index->nodes, s.nodes);
+    umb_built_free(&index->built, a);
     umb_memory_free(a, index->places, s.places);
+    umb_memory_free(a, index->next, s.next);
     umb_memory_free(a, index->objects, s.objects);
     umb_memory_free(a, index->below, s.below);
     umb_memory_free(a, index->blocks, s.blocks);
@@ -189,41 +207,46 @@ static bool furnish(umb_index *out, uint32_t object_count)
     const umb_allocator *a = &out->allocator;
     sizes s = sizes_of(&out->tree, object_count);
     out->places = umb_memory_allocate(a, s.places);
+    out->next = s.next > 0 ? umb_memory_allocate(a, s.next) : NULL;
     out->objects = umb_memory_allocate(a, s.objects);
     out->below = umb_memory_allocate(a, s.below);
     out->blocks = umb_memory_allocate_zero(a, s.blocks, 1);
     out->marks = (umb_bvh_marks){0};
-    return out->places != NULL && out->objects != NULL && out->below != NULL && out->blocks != NULL &&
-           umb_bvh_marks_create(&out->marks, a, out->tree.node_count) == UMB_OK;
+    return out->places != NULL && (out->next != NULL || s.next == 0) && out->objects != NULL && out->below != NULL &&
+           out->blocks != NULL && umb_bvh_marks_create(&out->marks, a, out->tree.node_count) == UMB_OK;
 }
 
-/* Take over new nodes, or free them when there is no memory to follow their objects. */
-static umb_result adopt(umb_index *index, const umb_committed *c, umb_node *nodes,
-                        uint32_t node_count, uint32_t item_count)
+/* Take over what was built over so many items, or free it when there is no memory to follow their objects. */
+static umb_result adopt(umb_index *index, const umb_committed *c, umb_built *built, uint32_t item_count)
 {
     umb_index next = *index;
-    next.nodes = nodes;
-    next.tree.node_count = node_count;
-    next.tree.item_count = item_count;
-    next.tree.block_count = next.tree.flat ? count_blocks(node_count) : 0;
+    umb_tree *tree = &next.tree;
+    next.built = *built;
+    tree->node_count = built->node_count;
+    tree->item_count = built->slot_count;
+    tree->several = built->slot_count > item_count;
+    tree->block_count = tree->flat ? count_blocks(built->node_count) : 0;
     next.structure = c->structure;
     next.object_count = c->object_count;
     next.first_free_occluder = c->first_free_occluder;
     next.occluder_count = c->occluder_count;
+    next.item_count = item_count;
     if (!furnish(&next, c->object_count)) {
         drop(&next);
         return UMB_ERROR_MEMORY;
     }
     drop(index);
-    umb_bvh_find_places(nodes, node_count, next.places, c->object_count);
-    next.tree.object_count = umb_bvh_list_objects(nodes, node_count, next.objects, next.below);
-    if (next.tree.flat) {
-        lay_blocks(next.blocks, next.below, node_count);
+    umb_bvh_find_places(built->nodes, built->node_count, next.places, c->object_count, next.next);
+    tree->object_count = umb_bvh_list_objects(built->nodes, built->node_count, next.objects, next.below);
+    if (tree->flat) {
+        lay_blocks(next.blocks, next.below, built->node_count);
     }
-    next.tree.nodes = nodes;
-    next.tree.objects = next.objects;
-    next.tree.below = next.below;
-    next.tree.blocks = next.blocks;
+    tree->nodes = built->nodes;
+    tree->orders = built->orders;
+    tree->planes = built->planes;
+    tree->objects = next.objects;
+    tree->below = next.below;
+    tree->blocks = next.blocks;
     *index = next;
     return UMB_OK;
 }
@@ -235,8 +258,7 @@ static umb_result rebuild(umb_index *index, const umb_committed *c)
         return umb_scene_fail(index->scene, UMB_ERROR_LIMIT, "more than 2^30 objects and occluders");
     }
     uint32_t count = count_items(c);
-    umb_node *nodes = NULL;
-    uint32_t node_count = 0;
+    umb_built built = {0};
     umb_result result = UMB_OK;
     if (count > 0) {
         const umb_allocator *a = &index->allocator;
@@ -244,14 +266,12 @@ static umb_result rebuild(umb_index *index, const umb_committed *c)
         result = UMB_ERROR_MEMORY;
         if (items != NULL) {
             gather_items(c, items);
-            result = index->tree.flat
-                         ? build_flat(a, items, count, &nodes, &node_count)
-                         : umb_bvh_build(a, &index->tasks, items, count, &nodes, &node_count);
+            result = build(index, items, count, &built);
         }
         umb_memory_free(a, items, count * sizeof(items[0]));
     }
     if (result == UMB_OK) {
-        result = adopt(index, c, nodes, node_count, count);
+        result = adopt(index, c, &built, count);
     }
     if (result != UMB_OK) {
         return umb_scene_fail(index->scene, result, "no memory to index %u items", count);
@@ -273,12 +293,19 @@ static umb_result update(void *user)
     if (index->tree.version == c->version) {
         return UMB_OK;
     }
-    if (only_moved(index, c)) {
-        /* One commit since the version shown: its list of moves is all of them. */
-        if (index->tree.version + 1 == c->version) {
-            umb_bvh_refit_moved(index->nodes, &index->marks, index->places, c);
+    /* One commit since the version shown: its list of moves is all of them. */
+    bool next = index->tree.version + 1 == c->version;
+    if (only_moved(index, c) && (next || !index->tree.several)) {
+        if (index->tree.orders != NULL && c->moved_count > 0) {
+            index->tree.orders = NULL; /* what moved may be in other cells now */
+        }
+        if (next && index->tree.several) {
+            umb_parts_gather_moved(index->built.nodes, index->places, index->next, &index->marks, c);
+        }
+        if (next) {
+            umb_bvh_refit_moved(index->built.nodes, &index->marks, index->places, c);
         } else {
-            umb_bvh_refit(index->nodes, index->tree.node_count, c);
+            umb_bvh_refit(index->built.nodes, index->tree.node_count, c);
         }
     } else {
         umb_result result = rebuild(index, c);
@@ -295,9 +322,10 @@ static umb_result update(void *user)
 /* What is known of stored nodes while they are read. */
 typedef struct restorer {
     const umb_committed *scene;
+    const umb_stored_tree *stored;
     umb_node *nodes;
     uint8_t *seen; /* nodes, then objects, then occluders: named by some slot before */
-    uint32_t node_count, item_count;
+    uint32_t item_count, slot_count;
     bool flat;
 } restorer;
 
@@ -305,38 +333,57 @@ typedef struct restorer {
  * A node comes after the one that names it, so that no walk can run in circles. */
 static uint32_t place_of(const restorer *r, uint32_t node, uint32_t ref)
 {
-    uint32_t number = ref & UMB_REF_NUMBER;
+    uint32_t number = ref & UMB_REF_NUMBER, node_count = r->stored->node_count;
     switch (ref & UMB_REF_KIND) {
     case UMB_REF_NODE:
-        return !r->flat && number > node && number < r->node_count ? number : UMB_NONE;
+        return !r->flat && number > node && number < node_count ? number : UMB_NONE;
     case UMB_REF_OBJECT:
-        return number < r->scene->object_count && r->scene->objects[number].live
-                   ? r->node_count + number
-                   : UMB_NONE;
+        return number < r->scene->object_count && r->scene->objects[number].live ? node_count + number : UMB_NONE;
     case UMB_REF_OCCLUDER:
         return number >= r->scene->first_free_occluder && number < r->scene->occluder_count
-                   ? r->node_count + r->scene->object_count + number
+                   ? node_count + r->scene->object_count + number
                    : UMB_NONE;
     default:
         return UMB_NONE;
     }
 }
 
+/* The stored box of a part, if it is one. */
+static bool restore_box(const restorer *r, uint32_t k, uint32_t slot)
+{
+    umb_node *node = &r->nodes[k];
+    for (int i = 0; i < 3; ++i) {
+        float low = r->stored->boxes[k][i][slot], high = r->stored->boxes[k][3 + i][slot];
+        if (!isfinite(low) || !isfinite(high) || low > high) {
+            return false;
+        }
+        node->min[i][slot] = low;
+        node->max[i][slot] = high;
+    }
+    return true;
+}
+
 static bool restore_node(restorer *r, uint32_t k, const uint32_t refs[UMB_NODE_WIDTH])
 {
     umb_node *node = &r->nodes[k];
+    bool parts = r->stored->boxes != NULL;
     while (node->count < UMB_NODE_WIDTH && refs[node->count] != UMB_NONE) {
         uint32_t ref = refs[node->count], place = place_of(r, k, ref);
-        if (place == UMB_NONE || r->seen[place]) {
+        bool is_node = (ref & UMB_REF_KIND) == UMB_REF_NODE;
+        if (place == UMB_NONE || (r->seen[place] && (is_node || !parts))) {
             return false;
         }
-        r->seen[place] = 1;
-        if ((ref & UMB_REF_KIND) == UMB_REF_NODE) {
+        if (is_node) {
             r->nodes[ref].parent = k;
             r->nodes[ref].slot = node->count;
         } else {
-            r->item_count += 1;
+            r->item_count += !r->seen[place];
+            r->slot_count += 1;
+            if (parts && !restore_box(r, k, node->count)) {
+                return false;
+            }
         }
+        r->seen[place] = 1;
         node->ref[node->count++] = ref;
     }
     for (uint32_t i = node->count; i < UMB_NODE_WIDTH; ++i) {
@@ -347,32 +394,53 @@ static bool restore_node(restorer *r, uint32_t k, const uint32_t refs[UMB_NODE_W
     return node->count > 0 && (r->flat || k == 0 || r->seen[k]);
 }
 
-static umb_result restore_nodes(umb_index *index, const uint32_t (*refs)[UMB_NODE_WIDTH],
-                                uint32_t node_count)
+/* Boxes of nodes from those of parts. */
+static void fit_nodes(const restorer *r)
+{
+    for (uint32_t k = r->stored->node_count; k-- > 0;) {
+        umb_node *node = &r->nodes[k];
+        umb_node_pad(node);
+        if (node->parent != UMB_NONE) {
+            umb_aabb box = umb_node_bounds(node);
+            umb_node *parent = &r->nodes[node->parent];
+            for (int i = 0; i < 3; ++i) {
+                parent->min[i][node->slot] = box.min[i];
+                parent->max[i][node->slot] = box.max[i];
+            }
+        }
+    }
+}
+
+static umb_result restore_nodes(umb_index *index, const umb_stored_tree *stored)
 {
     const umb_allocator *a = &index->allocator;
     const umb_committed *c = umb_scene_committed(index->scene);
-    restorer r = {.scene = c, .node_count = node_count, .flat = index->tree.flat};
-    size_t places = (size_t)node_count + c->object_count + c->occluder_count;
-    r.nodes = umb_memory_allocate_zero(a, node_count, sizeof(umb_node));
+    restorer r = {.scene = c, .stored = stored, .flat = index->tree.flat};
+    size_t places = (size_t)stored->node_count + c->object_count + c->occluder_count;
+    r.nodes = umb_memory_allocate_zero(a, stored->node_count, sizeof(umb_node));
     r.seen = umb_memory_allocate_zero(a, places, 1);
     umb_result result = r.nodes != NULL && r.seen != NULL ? UMB_OK : UMB_ERROR_MEMORY;
-    for (uint32_t k = 0; k < node_count && result == UMB_OK; ++k) {
+    for (uint32_t k = 0; k < stored->node_count && result == UMB_OK; ++k) {
         r.nodes[k].parent = UMB_NONE;
     }
-    for (uint32_t k = 0; k < node_count && result == UMB_OK; ++k) {
-        result = restore_node(&r, k, refs[k]) ? UMB_OK : UMB_ERROR_FORMAT;
+    for (uint32_t k = 0; k < stored->node_count && result == UMB_OK; ++k) {
+        result = restore_node(&r, k, stored->refs[k]) ? UMB_OK : UMB_ERROR_FORMAT;
     }
     if (result == UMB_OK && r.item_count != count_items(c)) {
         result = UMB_ERROR_FORMAT;
     }
     umb_memory_free(a, r.seen, places);
+    umb_built built = {.nodes = r.nodes, .node_count = stored->node_count, .slot_count = r.slot_count};
     if (result != UMB_OK) {
-        umb_memory_free(a, r.nodes, node_count * sizeof(umb_node));
+        umb_built_free(&built, a);
         return umb_scene_fail(index->scene, result, "stored nodes make no index");
     }
-    umb_bvh_refit(r.nodes, node_count, c);
-    result = adopt(index, c, r.nodes, node_count, r.item_count);
+    if (stored->boxes != NULL) {
+        fit_nodes(&r);
+    } else {
+        umb_bvh_refit(r.nodes, stored->node_count, c);
+    }
+    result = adopt(index, c, &built, r.item_count);
     if (result != UMB_OK) {
         return umb_scene_fail(index->scene, result, "no memory to index %u items", r.item_count);
     }
@@ -385,8 +453,9 @@ static umb_result restore_nodes(umb_index *index, const uint32_t (*refs)[UMB_NOD
 static umb_result make_empty(umb_scene *scene, const umb_index_def *def, umb_index **out)
 {
     *out = NULL;
-    if (def->kind != UMB_INDEX_BVH && def->kind != UMB_INDEX_FLAT) {
-        return umb_scene_fail(scene, UMB_ERROR_ARGUMENT, "no index kind %d", (int)def->kind);
+    if (!umb_index_name_known(def)) {
+        return umb_scene_fail(scene, UMB_ERROR_ARGUMENT, "no index of kind %d with rule %d", (int)def->kind,
+                              (int)def->rule);
     }
     const umb_allocator *a = umb_scene_allocator(scene);
     umb_index *index = umb_memory_allocate_zero(a, 1, sizeof(*index));
@@ -395,8 +464,7 @@ static umb_result make_empty(umb_scene *scene, const umb_index_def *def, umb_ind
     }
     index->scene = scene;
     index->allocator = *a;
-    index->tasks = def->tasks;
-    index->kind = def->kind;
+    index->def = *def;
     index->tree.flat = def->kind == UMB_INDEX_FLAT;
     *out = index;
     return UMB_OK;
@@ -431,8 +499,7 @@ umb_result umb_index_create(umb_scene *scene, const umb_index_def *def, umb_inde
     return start_following(index, rebuild(index, umb_scene_committed(scene)), out);
 }
 
-umb_result umb_index_restore(umb_scene *scene, const umb_index_def *def,
-                             const uint32_t (*refs)[UMB_NODE_WIDTH], uint32_t node_count,
+umb_result umb_index_restore(umb_scene *scene, const umb_index_def *def, const umb_stored_tree *stored,
                              umb_index **out)
 {
     *out = NULL;
@@ -441,7 +508,7 @@ umb_result umb_index_restore(umb_scene *scene, const umb_index_def *def,
     if (result != UMB_OK) {
         return result;
     }
-    return start_following(index, restore_nodes(index, refs, node_count), out);
+    return start_following(index, restore_nodes(index, stored), out);
 }
 
 void umb_index_destroy(umb_index *index)
@@ -454,14 +521,6 @@ void umb_index_destroy(umb_index *index)
     }
 }
 
-static double half_area(const umb_aabb *b)
-{
-    double x = (double)b->max[0] - b->min[0];
-    double y = (double)b->max[1] - b->min[1];
-    double z = (double)b->max[2] - b->min[2];
-    return x * y + y * z + z * x;
-}
-
 /* A ray that meets the root meets a node in it with the ratio of their areas as probability, and
  * then tests its boxes (Gummerus 3.2 on surface areas; Goldsmith and Salmon 1987). */
 static double tree_cost(const umb_tree *tree)
@@ -469,11 +528,11 @@ static double tree_cost(const umb_tree *tree)
     if (tree->flat || tree->node_count == 0) {
         return tree->item_count;
     }
-    double root = half_area(&tree->bounds);
+    double root = umb_half_area(tree->bounds.min, tree->bounds.max);
     double cost = 0.0;
     for (uint32_t k = 0; k < tree->node_count; ++k) {
         umb_aabb b = umb_node_bounds(&tree->nodes[k]);
-        cost += (root > 0.0 ? half_area(&b) / root : 1.0) * tree->nodes[k].count;
+        cost += (root > 0.0 ? umb_half_area(b.min, b.max) / root : 1.0) * tree->nodes[k].count;
     }
     return cost;
 }
@@ -494,24 +553,14 @@ static uint32_t tree_depth(const umb_tree *tree)
 void umb_index_get_stats(const umb_index *index, umb_index_stats *out)
 {
     const umb_tree *tree = &index->tree;
-    out->items = tree->item_count;
+    out->items = index->item_count;
+    out->slots = tree->item_count;
     out->nodes = tree->node_count;
     out->depth = tree_depth(tree);
     out->cost = tree_cost(tree);
     sizes s = sizes_of(tree, index->object_count);
-    out->bytes = sizeof(*index) + s.nodes + s.places + s.objects + s.below + s.blocks +
-                 umb_bvh_marks_memory(&index->marks);
-}
-
-const char *umb_index_kind_name(umb_index_kind kind)
-{
-    switch (kind) {
-    case UMB_INDEX_BVH:
-        return "bvh";
-    case UMB_INDEX_FLAT:
-        return "flat";
-    }
-    return "unknown";
+    out->bytes = sizeof(*index) + umb_built_memory(&index->built) + s.places + s.next + s.objects + s.below +
+                 s.blocks + umb_bvh_marks_memory(&index->marks);
 }
 
 const umb_tree *umb_index_tree(const umb_index *index)
@@ -524,7 +573,7 @@ umb_scene *umb_index_scene(const umb_index *index)
     return index->scene;
 }
 
-umb_index_kind umb_index_get_kind(const umb_index *index)
+umb_index_def umb_index_settings(const umb_index *index)
 {
-    return index->kind;
+    return index->def;
 }

@@ -27,6 +27,47 @@ typedef struct umb_node {
     uint32_t pad[5];
 } umb_node;
 
+/* How the slots of a node come front to back from an eye, exactly (walk.h). Only trees whose cells are disjoint have
+ * it: what is in a cell lies on one side of each plane, so nothing on the eye's far side of one hides anything on the
+ * near side. Slots of one cell come in any order. */
+typedef enum umb_order_kind {
+    UMB_ORDER_ANY = 0,    /* one cell */
+    UMB_ORDER_PLANES = 1, /* up to seven planes, which split the slots' row again and again */
+    UMB_ORDER_OCTANTS = 2 /* up to three planes through one point, each through the whole node */
+} umb_order_kind;
+
+#define UMB_ORDER_END 0xFFu
+#define UMB_ORDER_TILTED 3u /* an axis: the plane is one of umb_tree.planes */
+
+/* PLANES: split s divides a run of slots, split 0 all of them: those before middle[s] are on the plane's lower side, the
+ * others on its upper one. next[s] are the splits of these two runs, END: a single cell. The plane is axis[s] = at[s],
+ * or plane number number[s].
+ * OCTANTS: bit i of axes says that the plane axis i = at[i] splits, bit i of octant[slot] on which side of it a slot is
+ * (1: the upper one; 0 where the plane does not split). */
+typedef struct umb_order {
+    uint8_t kind;
+    uint8_t axes;
+    union {
+        uint8_t octant[UMB_NODE_WIDTH];
+        struct {
+            uint8_t middle[UMB_NODE_WIDTH - 1];
+            uint8_t next[UMB_NODE_WIDTH - 1][2];
+            uint8_t axis[UMB_NODE_WIDTH - 1];
+        };
+    };
+    uint8_t pad[2];
+    union {
+        float at[UMB_NODE_WIDTH - 1];
+        uint32_t number[UMB_NODE_WIDTH - 1];
+    };
+    uint32_t pad_end;
+} umb_order;
+
+/* The points with n.p = d in real numbers: these doubles define it. The upper side is n.p > d. */
+typedef struct umb_tilted_plane {
+    double n[3], d;
+} umb_tilted_plane;
+
 /* What lies side by side in the list of a tree's objects. */
 typedef struct umb_range {
     uint32_t first, count;
@@ -38,12 +79,19 @@ typedef struct umb_range {
 typedef struct umb_tree {
     const umb_node *nodes; /* parents before children; the root is node 0 */
     uint32_t node_count;   /* 0: the index is empty */
-    uint32_t item_count;
+    uint32_t item_count;   /* slots that name items; as many as there are items unless several is set */
+    /* An item may be in several slots, each with the box of a part of it; the parts together hold all of it. Walks
+     * then answer an object once, and only a whole object has a depth, a size, or lies inside something. An object of
+     * such a tree that has moved may be in one slot with its whole box, and still in the lists below other nodes. */
+    bool several;
     bool flat;             /* the nodes are a plain list of rows of eight items, no hierarchy: walk them all */
     /* The objects, so that those below a node lie side by side; and for each node where. Moves change neither. */
     const uint32_t *objects;
     const umb_range *below; /* nodes, then blocks */
-    uint32_t object_count; /* in the list: the live ones */
+    uint32_t object_count; /* in the list: the live ones, each as often as it has a slot */
+    /* One a node; NULL: the tree knows no strict order (and after moves that could break it). */
+    const umb_order *orders;
+    const umb_tilted_plane *planes;
     /* Flat: boxes around each eight rows, in blocks like nodes; boxes around each eight of these, and so on to one.
      * They follow the order of the list, whatever that is. Block k has the number node_count + k, in refs and below. */
     const umb_node *blocks;
@@ -61,13 +109,21 @@ static inline const umb_node *umb_tree_node(const umb_tree *tree, uint32_t numbe
 
 const umb_tree *umb_index_tree(const umb_index *index);
 umb_scene *umb_index_scene(const umb_index *index);
-umb_index_kind umb_index_get_kind(const umb_index *index);
+/* What it was made with. */
+umb_index_def umb_index_settings(const umb_index *index);
 
-/* Make an index whose nodes hold what an earlier one's did (captures; a refitted tree is not the
- * one that building would give). refs: the slots of each node, UMB_NONE behind the last. Boxes come
- * from the scene. UMB_ERROR_FORMAT unless the nodes are one tree, or rows if flat, that holds each
- * item once. */
-umb_result umb_index_restore(umb_scene *scene, const umb_index_def *def,
-                             const uint32_t (*refs)[UMB_NODE_WIDTH], uint32_t node_count, umb_index **out);
+/* What a capture holds of a tree: the slots of each node, UMB_NONE behind the last; if items are in several slots the
+ * boxes of the parts, as in umb_node (those of nodes are not looked at), else NULL. */
+typedef struct umb_stored_tree {
+    const uint32_t (*refs)[UMB_NODE_WIDTH];
+    const float (*boxes)[6][UMB_NODE_WIDTH];
+    uint32_t node_count;
+} umb_stored_tree;
+
+/* Make an index whose nodes hold what an earlier one's did (a refitted tree is not the one that building would
+ * give). Boxes come from the scene where none are stored. UMB_ERROR_FORMAT unless the nodes are one tree, or rows if
+ * flat, that holds each item once, or with boxes at least once. It knows no strict order. */
+umb_result umb_index_restore(umb_scene *scene, const umb_index_def *def, const umb_stored_tree *stored,
+                             umb_index **out);
 
 #endif

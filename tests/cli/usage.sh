@@ -72,7 +72,8 @@ run cull $scene $view --near 5 --far 5
 run cull $scene $view --far -inf
 run cull $scene $view --min-pixels -1
 run cull $scene $view --method hzb
-run cull $scene $view --index octree
+run cull $scene $view --index heap
+run cull $scene $view --index kdtree,sah
 run cull $scene $view --isa mmx
 run cull $scene $view --threads 0
 run cull $scene $view --threads 257

@@ -239,7 +239,7 @@ static int print_json(const check *c, const setup *s, const options *o, bool is_
     json_text_open(&j, NULL, '{');
     json_text_string(&j, "method", umb_method_name(o->method));
     json_text_string(&j, "class", umb_class_name(c->views[0].frame.class_));
-    json_text_string(&j, "index", umb_index_kind_name(o->index));
+    json_text_string(&j, "index", umb_index_name(&o->index));
     json_text_count(&j, "objects", s->model->object_count);
     json_text_count(&j, "views", c->count);
     json_text_count(&j, "in_frustum", in_frustum);
@@ -281,7 +281,7 @@ static int print_text(const check *c, const setup *s, const options *o)
     const model *m = s->model;
     spread(c, &mean, &largest);
     printf("%s (%s), index %s, %u objects\n\n", umb_method_name(o->method),
-           umb_class_name(c->views[0].frame.class_), umb_index_kind_name(o->index), m->object_count);
+           umb_class_name(c->views[0].frame.class_), umb_index_name(&o->index), m->object_count);
     printf("%6s %10s %10s %10s %6s %11s %8s %9s\n", "row", "in frustum", "reported", "truth",
            "wrong", "unconfirmed", "ratio", "ms");
     for (uint32_t k = 0; k < c->count; ++k) {

@@ -55,7 +55,7 @@ static int print_json(const frame *f, const options *o)
 static int print_text(const frame *f)
 {
     printf("%-12s %s (%s), index %s\n", "method", umb_method_name(f->method),
-           umb_class_name(f->class_), umb_index_kind_name(f->index));
+           umb_class_name(f->class_), umb_index_name(&f->index));
     printf("%-12s %u\n", "objects", f->objects);
     printf("%-12s %u\n", "in frustum", f->in_frustum);
     printf("%-12s %u\n", "visible", f->stats.visible);

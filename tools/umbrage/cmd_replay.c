@@ -109,7 +109,7 @@ static int print_json(const replay *r, const options *o)
     json_text_close(&j, ']');
     json_text_string(&j, "method", umb_method_name(r->capture.method));
     json_text_string(&j, "class", umb_class_name(r->set.class_));
-    json_text_string(&j, "index", umb_index_kind_name(r->capture.kind));
+    json_text_string(&j, "index", umb_index_name(&r->capture.index_def));
     json_text_count(&j, "objects", umb_scene_object_count(r->capture.scene));
     json_text_count(&j, "visible", r->set.count);
     json_text_count(&j, "captured_visible", r->capture.answer_count);
@@ -124,7 +124,7 @@ static int print_json(const replay *r, const options *o)
 static int print_text(const replay *r)
 {
     printf("%-12s %s (%s), index %s\n", "method", umb_method_name(r->capture.method),
-           umb_class_name(r->set.class_), umb_index_kind_name(r->capture.kind));
+           umb_class_name(r->set.class_), umb_index_name(&r->capture.index_def));
     printf("%-12s %u\n", "objects", umb_scene_object_count(r->capture.scene));
     printf("%-12s %u, hash %016llx\n", "captured", r->capture.answer_count,
            (unsigned long long)r->captured_hash);

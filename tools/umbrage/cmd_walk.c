@@ -84,7 +84,7 @@ static int print_text(const walk *w, const options *o)
     const frame *f = w->frames;
     uint32_t step = options_given(o, "list") ? 1 : (w->count + 19) / 20;
     printf("%s (%s), index %s, %u objects\n\n", umb_method_name(f->method),
-           umb_class_name(f->class_), umb_index_kind_name(f->index), f->objects);
+           umb_class_name(f->class_), umb_index_name(&f->index), f->objects);
     printf("%6s %10s %10s %10s %10s  %s\n", "row", "in frustum", "visible", "occluders", "ms",
            "hash");
     for (uint32_t k = 0; k < w->count; ++k) {

@@ -9,7 +9,7 @@ typedef struct frame {
     uint32_t row; /* of the path */
     umb_method method;
     umb_class class_;
-    umb_index_kind index;
+    umb_index_def index;
     uint32_t objects;    /* of the scene */
     uint32_t in_frustum; /* objects whose bounds meet the frustum */
     umb_cull_stats stats;

@@ -244,13 +244,15 @@ static const char *read_method(options *o, const char *text)
 
 static const char *read_index(options *o, const char *text)
 {
-    for (int k = UMB_INDEX_BVH; k <= UMB_INDEX_FLAT; ++k) {
-        if (strcmp(text, umb_index_kind_name((umb_index_kind)k)) == 0) {
-            o->index = (umb_index_kind)k;
-            return NULL;
-        }
+    static char names[640];
+    if (umb_index_parse(text, &o->index)) {
+        return NULL;
     }
-    return "one of bvh, flat";
+    size_t used = (size_t)snprintf(names, sizeof names, "one of");
+    for (uint32_t k = 0; umb_index_variant(k) != NULL && used < sizeof names; ++k) {
+        used += (size_t)snprintf(names + used, sizeof names - used, "%s %s", k > 0 ? ";" : "", umb_index_variant(k));
+    }
+    return names;
 }
 
 static const char *read_isa(options *o, const char *text)
@@ -465,7 +467,7 @@ static const option_spec specs[] = {
      "depth of the far plane (default: the scene's farthest corner)"},
 
     {"method", 0, VIEWS, "NAME", read_method, "raster or none: frustum only (default raster)"},
-    {"index", 0, SCENES, "NAME", read_index, "bvh or flat: no hierarchy (default bvh)"},
+    {"index", 0, SCENES, "NAME", read_index, "how objects are found: bvh, flat, kdtree; see the manual (default bvh)"},
     {"buffer", 0, VIEWS, "WxH", read_buffer, "the method's own raster (default 1024x288)"},
     {"coherence", 0, MANY_VIEWS, "NAMES", read_coherence,
      "carry over: list, hierarchy, propagation, conservative, rest, all (default none)"},

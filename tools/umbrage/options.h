@@ -44,7 +44,7 @@ typedef struct options {
     uint32_t row, from, to, every;
 
     umb_method method;
-    umb_index_kind index;
+    umb_index_def index;
     umb_isa isa;
     uint32_t coherence, occluder_budget; /* umb_culler_def */
     uint32_t threads, repeat;

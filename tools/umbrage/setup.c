@@ -81,8 +81,9 @@ int setup_scene(setup *s, const options *o)
     if (!s->scene) {
         return fail(o, EXIT_INPUT, "%s: %s", o->input, s->error.text);
     }
-    umb_result result = umb_index_create(
-        s->scene, &(umb_index_def){.kind = o->index, .tasks = s->tasks}, &s->index);
+    umb_index_def def = o->index;
+    def.tasks = s->tasks;
+    umb_result result = umb_index_create(s->scene, &def, &s->index);
     if (result != UMB_OK) {
         return fail(o, EXIT_INPUT, "%s: the index: %s", o->input, umb_result_name(result));
     }
