@@ -22,6 +22,12 @@ typedef struct image {
     double low[2], high[2], depth;
 } image;
 
+/* Without the care for NaN that keeps fmin from being one instruction. */
+static double least(double a, double b)
+{
+    return b < a ? b : a;
+}
+
 static bool project(const search *s, const umb_aabb *box, image *out)
 {
     const umb_view *view = s->view.view;
@@ -34,15 +40,15 @@ static bool project(const search *s, const umb_aabb *box, image *out)
             d[i] = (corner >> i & 1 ? box->max[i] : box->min[i]) - view->eye[i];
             depth += d[i] * view->forward[i];
         }
-        out->depth = fmin(out->depth, depth - view->near_depth);
+        out->depth = least(out->depth, depth - view->near_depth);
         double scale = view->projection == UMB_PERSPECTIVE ? depth : 1.0;
         for (int k = 0; k < 2; ++k) {
             double at = (d[0] * axes[k][0] + d[1] * axes[k][1] + d[2] * axes[k][2]) / scale;
             double size = k == 0 ? s->grid_width : s->grid_height;
             at = (at - ends[k][0]) / (ends[k][1] - ends[k][0]) * size;
             at = k == 0 ? at : size - at;
-            out->low[k] = fmin(out->low[k], at);
-            out->high[k] = fmax(out->high[k], at);
+            out->low[k] = least(out->low[k], at);
+            out->high[k] = -least(-out->high[k], -at);
         }
     }
     /* A box that reaches behind the near plane: anywhere in the picture. */
@@ -77,6 +83,15 @@ static nearness nearness_of(const search *s, uint32_t object)
     return room(s, &m, 0.0) ? ROOM_WITHIN : room(s, &m, 1.0) ? ROOM_BESIDE : NO_ROOM;
 }
 
+/* The grid is cast once, so what it says of an object stays. */
+static nearness remembered(search *s, uint32_t object)
+{
+    if (s->near[object] == 0) {
+        s->near[object] = (uint8_t)(nearness_of(s, object) + 1);
+    }
+    return (nearness)(s->near[object] - 1);
+}
+
 typedef struct rank {
     uint64_t key; /* nearness, then by lot */
     uint32_t object;
@@ -88,31 +103,58 @@ static int by_key(const void *a, const void *b)
     return x->key < y->key ? -1 : x->key > y->key;
 }
 
+/* The ranks of least key among those added: twice as many as are wanted are kept before they are sorted and cut. */
+typedef struct shortlist {
+    rank *ranks;
+    uint32_t count, most;
+    uint64_t limit; /* greater keys are no use */
+} shortlist;
+
+static void shorten(shortlist *l)
+{
+    qsort(l->ranks, l->count, sizeof(*l->ranks), by_key);
+    if (l->count >= l->most) {
+        l->count = l->most;
+        l->limit = l->ranks[l->most - 1].key;
+    }
+}
+
+static void add(shortlist *l, rank r)
+{
+    if (r.key > l->limit) {
+        return;
+    }
+    l->ranks[l->count++] = r;
+    if (l->count == 2 * l->most) {
+        shorten(l);
+    }
+}
+
 void search_choose_nearest(search *s, uint32_t most)
 {
     uint32_t count = s->target_count;
     if (count <= most) {
         return;
     }
-    rank *ranks = malloc(count * sizeof(*ranks));
+    rank *ranks = malloc(4 * (size_t)most * sizeof(*ranks));
     if (!ranks) {
         s->failed = true;
         return;
     }
-    uint32_t roomy = 0;
+    shortlist roomy = {ranks, 0, most, UINT64_MAX}, others = {ranks + 2 * (size_t)most, 0, most, UINT64_MAX};
     for (uint32_t k = 0; k < count; ++k) {
         uint32_t object = s->targets[k];
-        nearness near = nearness_of(s, object);
-        roomy += near != NO_ROOM;
-        ranks[k].key = (uint64_t)near << 62 | oracle_mix(object, s->round, 11) >> 2;
-        ranks[k].object = object;
+        nearness near = remembered(s, object);
+        rank r = {(uint64_t)near << 62 | oracle_mix(object, s->round, 11) >> 2, object};
+        add(near != NO_ROOM ? &roomy : &others, r);
     }
-    qsort(ranks, count, sizeof(*ranks), by_key);
+    shorten(&roomy);
+    shorten(&others);
     /* An eighth of the choice is from those without room, whatever there is of the others. */
-    uint32_t first = roomy < most - most / 8 ? roomy : most - most / 8;
+    uint32_t first = roomy.count < most - most / 8 ? roomy.count : most - most / 8;
     for (uint32_t k = 0; k < most; ++k) {
-        uint32_t from = k < first ? k : roomy + k - first;
-        s->targets[k] = ranks[from < count ? from : k].object;
+        bool other = k >= first && k - first < others.count;
+        s->targets[k] = other ? others.ranks[k - first].object : roomy.ranks[k].object;
     }
     s->target_count = most;
     free(ranks);

@@ -253,6 +253,17 @@ static bool choose_borders(search *s, size_t *count)
     return true;
 }
 
+/* A find that is still a ray's word. */
+static bool is_pending(const search *s, int r, uint32_t object)
+{
+    return (s->flags[r][object] & (FLAG_SEEN | FLAG_VERIFIED)) == FLAG_SEEN;
+}
+
+static bool has_leak(const search *s, int r, uint32_t object)
+{
+    return (s->flags[r][object] & FLAG_LEAK) != 0;
+}
+
 /* Items: target * 2 + renderer. Each writes its own object's proof only. */
 static void verify_item(worker *w, uint64_t item)
 {
@@ -260,7 +271,7 @@ static void verify_item(worker *w, uint64_t item)
     uint32_t object = s->targets[item / 2];
     int r = (int)(item % 2);
     const find *f = &s->finds[r][object];
-    if (f->ray != NO_RAY && !f->verified) {
+    if (is_pending(s, r, object)) {
         oracle_confirm_near(s->t, &s->view, f->through, object, f->triangle, (uint8_t)(1u << r),
                             &s->proven[r][object]);
     }
@@ -269,20 +280,22 @@ static void verify_item(worker *w, uint64_t item)
 static void settle(search *s, int r, uint32_t object)
 {
     find *f = &s->finds[r][object];
-    if (f->ray == NO_RAY || f->verified) {
+    uint8_t *flags = &s->flags[r][object];
+    if (!is_pending(s, r, object)) {
         return;
     }
     if (s->proven[r][object].renderers) {
-        f->verified = true;
+        *flags |= FLAG_VERIFIED;
         ++s->news;
         return;
     }
-    if (s->leaks[r][object].ray == NO_RAY) {
+    if (!has_leak(s, r, object)) {
         s->leaks[r][object] = *f;
-        s->leaks[r][object].refuted = 0;
+        *flags |= FLAG_LEAK;
     }
     ++f->refuted;
     f->ray = NO_RAY;
+    *flags &= (uint8_t)~FLAG_SEEN;
 }
 
 /* Look into all finds that are not proven yet: prove them, or forget them. */
@@ -290,11 +303,7 @@ static void verify(search *s)
 {
     s->target_count = 0;
     for (uint32_t i = 0; i < s->t->model->object_count; ++i) {
-        if (!s->in_view[i]) {
-            continue;
-        }
-        const find *a = &s->finds[0][i], *b = &s->finds[1][i];
-        if ((a->ray != NO_RAY && !a->verified) || (b->ray != NO_RAY && !b->verified)) {
+        if (is_pending(s, 0, i) || is_pending(s, 1, i)) {
             s->targets[s->target_count++] = i;
         }
     }
@@ -317,25 +326,27 @@ static void cover_item(worker *w, uint64_t item)
     search *s = w->s;
     uint32_t object = s->targets[item / 2];
     int r = (int)(item % 2);
-    find *f = &s->finds[r][object], *leak = &s->leaks[r][object];
+    find *f = &s->finds[r][object];
     bool asked = item / 2 < s->asked;
     cover_verdict verdict = oracle_cover(s->t, &s->view, object, (uint8_t)(1u << r),
                                          asked ? COVER_ASKED : COVER_ACCUSED, &s->proven[r][object]);
     s->verdicts[item] = (uint8_t)verdict;
     if (verdict == COVER_HIDDEN) {
-        leak->refuted = leak->ray != NO_RAY;
-        leak->ray = NO_RAY;
+        if (has_leak(s, r, object)) {
+            s->flags[r][object] |= FLAG_WITHDRAWN;
+        }
+        s->flags[r][object] &= (uint8_t)~FLAG_LEAK;
     } else if (verdict == COVER_SEEN) {
         f->ray = s->phase << 52 | item;
-        f->verified = true;
+        s->flags[r][object] |= FLAG_SEEN | FLAG_VERIFIED;
     }
 }
 
 static void add_accused(search *s, bool suspected)
 {
     for (uint32_t i = 0; i < s->t->model->object_count; ++i) {
-        bool leaked = s->leaks[0][i].ray != NO_RAY || s->leaks[1][i].ray != NO_RAY;
-        if (is_accused(s, i) && leaked == suspected) {
+        bool leaked = has_leak(s, 0, i) || has_leak(s, 1, i);
+        if (leaked == suspected && is_accused(s, i)) {
             s->targets[s->target_count++] = i;
         }
     }
@@ -395,17 +406,19 @@ static bool search_make(search *s)
     size_t objects = t->model->object_count;
     uint64_t triangles = t->first_triangle[objects];
     s->in_view = calloc(objects + 1, 1);
+    s->near = calloc(objects + 1, 1);
     s->targets = calloc(objects + 1, sizeof(*s->targets));
     s->known = calloc((size_t)(triangles / 64 + 1), sizeof(*s->known));
     s->grid = calloc((size_t)s->grid_width * s->grid_height, sizeof(*s->grid));
     s->workers = calloc(s->worker_count, sizeof(*s->workers));
     s->grid_depth = calloc((size_t)s->grid_width * s->grid_height, sizeof(*s->grid_depth));
-    bool ok = s->in_view && s->targets && s->known && s->grid && s->grid_depth && s->workers;
+    bool ok = s->in_view && s->near && s->targets && s->known && s->grid && s->grid_depth && s->workers;
     for (int r = 0; r < 2; ++r) {
         s->finds[r] = calloc(objects + 1, sizeof(*s->finds[r]));
         s->proven[r] = calloc(objects + 1, sizeof(*s->proven[r]));
         s->leaks[r] = calloc(objects + 1, sizeof(*s->leaks[r]));
-        ok = ok && s->finds[r] && s->proven[r] && s->leaks[r];
+        s->flags[r] = calloc(objects + 1, 1);
+        ok = ok && s->finds[r] && s->proven[r] && s->leaks[r] && s->flags[r];
     }
     for (uint32_t i = 0; ok && i < s->worker_count; ++i) {
         s->workers[i].s = s;
@@ -432,9 +445,11 @@ static void search_free(search *s)
         free(s->finds[r]);
         free(s->proven[r]);
         free(s->leaks[r]);
+        free(s->flags[r]);
     }
     free(s->workers);
     free(s->in_view);
+    free(s->near);
     free(s->targets);
     free(s->known);
     free(s->fresh);
@@ -459,16 +474,16 @@ static void fill_witnesses(const search *s, truth_result *out)
         for (int r = 0; r < 2; ++r) {
             const find *leak = &s->leaks[r][i];
             truth_witness *w = &lists[r][i];
-            if (s->finds[r][i].ray != NO_RAY) {
+            if ((s->flags[r][i] & FLAG_SEEN) != 0) {
                 *w = s->proven[r][i];
                 ++*counts[r];
-            } else if (is_accused(s, i) && leak->ray != NO_RAY) {
+            } else if (is_accused(s, i) && has_leak(s, r, i)) {
                 memcpy(w->from, leak->from, sizeof(w->from));
                 memcpy(w->to, leak->to, sizeof(w->to));
                 w->renderers = (uint8_t)(1u << r);
                 leaked = true;
             }
-            refuted = refuted || leak->refuted != 0;
+            refuted = refuted || (s->flags[r][i] & FLAG_WITHDRAWN) != 0;
         }
         out->unconfirmed += leaked;
         out->withdrawn += refuted && !leaked && !seen;

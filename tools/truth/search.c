@@ -54,7 +54,7 @@ uint8_t search_known(const search *s, uint32_t object)
 {
     uint8_t seen = 0;
     for (int r = 0; r < 2; ++r) {
-        seen |= s->finds[r][object].ray != NO_RAY ? (uint8_t)(1u << r) : 0;
+        seen |= (s->flags[r][object] & FLAG_SEEN) != 0 ? (uint8_t)(1u << r) : 0;
     }
     return seen;
 }
@@ -265,6 +265,8 @@ static void merge(search *s)
                 uint8_t refuted = f->refuted;
                 *f = e->what;
                 f->refuted = refuted;
+                s->flags[r][e->object] |= FLAG_SEEN;
+                s->flags[r][e->object] &= (uint8_t)~FLAG_VERIFIED;
             }
         }
         w->event_count = 0;

@@ -22,8 +22,16 @@ typedef struct find {
     uint32_t triangle;
     uint8_t renderers;
     uint8_t refuted; /* how many finds of this object were leaks */
-    bool verified;
 } find;
+
+/* What the scans over all objects ask of a find and a leak, so that these are not touched for the many objects that
+ * have none. A byte each renderer and object, written by one worker at a time. */
+enum {
+    FLAG_SEEN = 1u << 0,     /* finds: ray is not NO_RAY */
+    FLAG_VERIFIED = 1u << 1, /* finds: verified */
+    FLAG_LEAK = 1u << 2,     /* leaks: there is one */
+    FLAG_WITHDRAWN = 1u << 3 /* there was one, and the object is proven hidden */
+};
 
 typedef struct find_event {
     find what;
@@ -51,6 +59,8 @@ typedef struct search {
     const truth_options *options;
     oracle_view view;
     find *finds[2];   /* per object: for TRUTH_CULLING, for TRUTH_TWO_SIDED */
+    uint8_t *flags[2]; /* per object: FLAG_... */
+    uint8_t *near;     /* per object: how near it is to being seen (nearness.c), plus one; 0: not looked at yet */
     uint8_t *in_view; /* per object: its box meets the view */
     uint64_t *known;  /* bits: triangles seen */
     uint64_t *fresh;  /* triangles seen since the borders were last walked, ascending */
@@ -63,7 +73,7 @@ typedef struct search {
     float *grid_depth; /* view depth beyond near up to which either renderer sees there */
     uint32_t grid_width, grid_height;
     truth_witness *proven[2]; /* per object: verified finds */
-    find *leaks[2];           /* per object: the first refuted find, or NO_RAY */
+    find *leaks[2];           /* per object: the first refuted find, where flags say so */
     uint32_t asked; /* targets to be decided that nothing speaks against; suspected ones follow */
     uint8_t *verdicts; /* cover_verdict, two per target of the last phase */
     worker *workers;
