@@ -3,7 +3,7 @@
  *   soak [--short] [--out FOLDER] [--threads N] [--scale X] [--only TEXT] [--views N]
  *        [--plant 1|2] [--part NAME --view K]
  *
- * Prints the table of docs/results/soak.md. What is done is kept in FOLDER (out/soak), a file for
+ * Prints the tables of docs/results/soak.md: views, then view cells. What is done is kept in FOLDER (out/soak), a file for
  * each part of the plan, and taken up by the next run of the same program over the same scenes.
  * --only: parts whose name or family contains TEXT. --views: of each part no more than N new ones.
  * --plant: cull a scene with a planted mistake (1: objects too small, 2: occluders too large),
@@ -132,8 +132,38 @@ static void print_row(const char *scene, const char *views, const soak_count *c)
 
 static const char *style_name(soak_style style)
 {
-    static const char *const names[] = {"ordinary", "adversarial", "adversarial"};
+    static const char *const names[] = {"ordinary", "adversarial", "adversarial", "cells", "cells"};
     return names[style];
+}
+
+static bool of_cells(const soak_part *part)
+{
+    return part->style == SOAK_CELLS || part->style == SOAK_MICRO_CELLS;
+}
+
+static void print_cell_row(const char *name, const soak_count *c)
+{
+    double seen = c->seen != 0 ? (double)c->seen : 1.0;
+    printf("| %s | %" PRIu64 " | %" PRIu64 " | %" PRIu64 " | %" PRIu64 " | %" PRIu64 " | %" PRIu64
+           " | %.3f | %" PRIu64 " | %" PRIu64 " | %" PRIu64 " | %.0f |\n",
+           name, c->views, c->rays, c->pairs, c->seen, c->reported, c->proven,
+           (double)c->reported / seen, c->open, c->wrong, c->unconfirmed, c->seconds);
+}
+
+static void print_cells(const soak_plan *plan, const soak_count *counts)
+{
+    soak_count all = {0};
+    puts("\n| scene | cells | rays | cell-object pairs | seen | refined | before refinement | "
+         "refined "
+         "over seen | undecided | wrongly hidden | unconfirmed | processor seconds |");
+    puts("|---|---|---|---|---|---|---|---|---|---|---|---|");
+    for (uint32_t k = 0; k < plan->count; ++k) {
+        if (of_cells(&plan->parts[k]) && counts[k].views != 0) {
+            print_cell_row(plan->parts[k].name, &counts[k]);
+            soak_count_add(&all, &counts[k]);
+        }
+    }
+    print_cell_row("**all cells**", &all);
 }
 
 static void print_table(const soak_plan *plan, const soak_count *counts)
@@ -145,6 +175,9 @@ static void print_table(const soak_plan *plan, const soak_count *counts)
     puts("|---|---|---|---|---|---|---|---|---|---|---|---|---|");
     for (uint32_t k = 0; k < plan->count; ++k) {
         const soak_part *part = &plan->parts[k];
+        if (of_cells(part)) {
+            continue;
+        }
         soak_count_add(&all, &counts[k]);
         if (strcmp(part->family, "blocks") != 0) {
             soak_count_add(&outside, &counts[k]);
@@ -159,6 +192,7 @@ static void print_table(const soak_plan *plan, const soak_count *counts)
     print_row("**all**", "", &all);
     print_row("all but blocks", "", &outside);
     print_row("all adversarial", "", &adversarial);
+    print_cells(plan, counts);
 }
 
 typedef struct soak_state {

@@ -7,6 +7,7 @@
 
 #include "support/planted.h"
 #include "support/strict.h"
+#include "umbrage/region.h"
 
 #define SOAK_BATCH                                                                                 \
     16u /* views that one culler answers one after the other, and that are saved at once */
@@ -14,7 +15,9 @@
 typedef enum soak_style {
     SOAK_ORDINARY = 0,    /* standing, flying, walking, turned, parallel, wide, narrow */
     SOAK_ADVERSARIAL = 1, /* from, along and through the scene's own vertices, edges and faces */
-    SOAK_MICRO = 2        /* a scene of tests/support/micro_scenes.h for every second view */
+    SOAK_MICRO = 2,       /* a scene of tests/support/micro_scenes.h for every second view */
+    SOAK_CELLS = 3,       /* view cells instead of views: ordinary and adversarial by turns */
+    SOAK_MICRO_CELLS = 4  /* a micro scene for every cell */
 } soak_style;
 
 /* One row of the table. */
@@ -25,7 +28,7 @@ typedef struct soak_part {
     soak_style style;
     uint32_t views;
     uint32_t most_targets, most_decided;
-    uint64_t rays; /* guided ones a view */
+    uint64_t rays; /* guided ones a view; all of a cell */
     double shift;  /* how many of its own extents the scene is moved away from the origin */
     bool weld;
 } soak_part;
@@ -66,14 +69,31 @@ bool soak_view_adversarial(const model *m, uint64_t number, umb_view *out);
 /* What kind of view that is, for people. */
 const char *soak_view_kind(uint64_t number);
 
+/* View cell number `number`, the method's settings with it. */
+bool soak_cell(const model *m, const camera_path *path, uint64_t number, umb_region_query *out);
+const char *soak_cell_kind(uint64_t number);
+
 /* What was counted, over views. seen: objects in view with an exactly confirmed sight-line. */
 typedef struct soak_count {
     uint64_t views, pairs, seen, reported, wrong, unconfirmed, rays;
-    uint64_t proven, open; /* hidden objects looked at exactly: proven hidden, not decided */
+    uint64_t proven, open; /* hidden objects looked at exactly: proven hidden, not decided. Of cells:
+                              objects in the sets before refinement, undecided ones after it */
     double seconds;        /* of one thread each */
 } soak_count;
 
 void soak_count_add(soak_count *sum, const soak_count *c);
+
+/* Who holds a cell's answer against rays. */
+typedef struct soak_judge {
+    const soak_part *part;
+    const model *model;
+    truth *oracle;
+    const char *folder; /* where wrongly hidden objects are told */
+    bool print;
+} soak_judge;
+
+bool soak_judge_cell(const soak_judge *j, umb_region *region, const camera_path *path,
+                     uint64_t number, soak_count *sum, umb_error *error);
 
 /* Saved progress of one part: a text file, a line a batch. */
 typedef struct soak_log {

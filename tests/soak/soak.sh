@@ -35,8 +35,10 @@ if [ "$whole" != "$again" ]; then
 fi
 for plant in 1 2; do
     folder_of_plant=$([ $plant = 1 ] && echo c || echo d)
-    run $folder_of_plant 1 --scale 1 --threads 2 --plant $plant --only medley-2k-adv >/dev/null || exit 1
-    grep -q '^wrongly-hidden: part ' "$folder/$folder_of_plant/wrongly-hidden.txt" || exit 1
+    for part in adversarial cells; do
+        run $folder_of_plant 1 --scale 1 --threads 2 --plant $plant --only medley-2k-$part >/dev/null || exit 1
+        grep -q "^wrongly-hidden: part medley-2k-$part " "$folder/$folder_of_plant/wrongly-hidden.txt" || exit 1
+    done
 done
 "$soak" --no-such-option 2>/dev/null
 [ $? = 2 ] || { echo "an unknown option is not refused" >&2; exit 1; }

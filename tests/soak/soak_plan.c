@@ -6,39 +6,64 @@
 #include "soak.h"
 #include "support/real_scenes.h"
 
-/* A scene with the views of either style that the full and the short run take of it. */
+/* A scene with the views of either style, and the cells, that the full and the short run take of it. */
 typedef struct scene_row {
     const char *family, *name, *scene;
     double shift;
     bool weld;
     uint32_t ordinary, adversarial;             /* of the full run */
     uint32_t short_ordinary, short_adversarial; /* of the short one */
+    uint32_t cells, short_cells;
 } scene_row;
 
 static const scene_row ROWS[] = {
-    {"blocks", "blocks-316", "gen:blocks,g=316", 0.0, true, 3200, 0, 0, 0},
-    {"blocks", "blocks-100", "gen:blocks,g=100", 0.0, true, 800, 300, 0, 0},
-    {"blocks", "blocks-32", "gen:blocks,g=32", 0.0, true, 800, 500, 24, 0},
-    {"blocks", "blocks-32-moved", "gen:blocks,g=32", 50.0, true, 160, 300, 0, 0},
-    {"boxfield", "boxfield-20M", "gen:boxfield,polygons=20M", 0.0, true, 1600, 0, 0, 0},
-    {"boxfield", "boxfield-200k", "gen:boxfield,polygons=200k", 0.0, true, 800, 500, 0, 0},
-    {"boxfield", "boxfield-200k-moved", "gen:boxfield,polygons=200k", 50.0, true, 160, 300, 0, 0},
-    {"city", "city-20M", "gen:city,triangles=20M", 0.0, true, 1600, 0, 0, 0},
-    {"city", "city-1M", "gen:city,triangles=1M", 0.0, true, 800, 600, 0, 0},
-    {"city", "city-200k-moved", "gen:city,triangles=200k", 50.0, true, 160, 300, 0, 0},
-    {"building", "building-40", "gen:building,floors=40", 0.0, true, 800, 500, 0, 0},
-    {"building", "building-1-moved", "gen:building,floors=1", 50.0, true, 160, 300, 0, 16},
-    {"medley", "medley-1M", "medley:1000000", 0.0, true, 1200, 0, 0, 0},
-    {"medley", "medley-20k", "medley:20000", 0.0, false, 800, 600, 0, 0},
-    {"medley", "medley-2k", "medley:2000", 0.0, true, 400, 500, 16, 16},
-    {"medley", "medley-2k-moved", "medley:2000", 5000.0, true, 160, 300, 0, 0},
+    {"blocks", "blocks-316", "gen:blocks,g=316", 0.0, true, 3200, 0, 0, 0, 0, 0},
+    {"blocks", "blocks-100", "gen:blocks,g=100", 0.0, true, 800, 300, 0, 0, 0, 0},
+    {"blocks", "blocks-32", "gen:blocks,g=32", 0.0, true, 800, 500, 24, 0, 48, 0},
+    {"blocks", "blocks-32-moved", "gen:blocks,g=32", 50.0, true, 160, 300, 0, 0, 0, 0},
+    {"boxfield", "boxfield-20M", "gen:boxfield,polygons=20M", 0.0, true, 1600, 0, 0, 0, 16, 0},
+    {"boxfield", "boxfield-200k", "gen:boxfield,polygons=200k", 0.0, true, 800, 500, 0, 0, 160, 0},
+    {"boxfield", "boxfield-200k-moved", "gen:boxfield,polygons=200k", 50.0, true, 160, 300, 0, 0,
+     32, 0},
+    {"city", "city-20M", "gen:city,triangles=20M", 0.0, true, 1600, 0, 0, 0, 16, 0},
+    {"city", "city-1M", "gen:city,triangles=1M", 0.0, true, 800, 600, 0, 0, 160, 0},
+    {"city", "city-200k-moved", "gen:city,triangles=200k", 50.0, true, 160, 300, 0, 0, 48, 0},
+    {"building", "building-40", "gen:building,floors=40", 0.0, true, 800, 500, 0, 0, 96, 0},
+    {"building", "building-1-moved", "gen:building,floors=1", 50.0, true, 160, 300, 0, 16, 64, 16},
+    {"medley", "medley-1M", "medley:1000000", 0.0, true, 1200, 0, 0, 0, 0, 0},
+    {"medley", "medley-20k", "medley:20000", 0.0, false, 800, 600, 0, 0, 64, 0},
+    {"medley", "medley-2k", "medley:2000", 0.0, true, 400, 500, 16, 16, 64, 16},
+    {"medley", "medley-2k-moved", "medley:2000", 5000.0, true, 160, 300, 0, 0, 0, 0},
 };
 enum { ROW_COUNT = sizeof ROWS / sizeof ROWS[0] };
 
 /* Views of each real scene, and of the micro scenes, two each. */
-enum { REAL_ORDINARY = 160, REAL_ADVERSARIAL = 320, MICRO_VIEWS = 6000, SHORT_MICRO = 48 };
+enum {
+    REAL_ORDINARY = 160,
+    REAL_ADVERSARIAL = 320,
+    REAL_CELLS = 32,
+    MICRO_VIEWS = 6000,
+    SHORT_MICRO = 48
+};
 
-static bool add(soak_plan *p, const scene_row *row, soak_style style, double views)
+/* Rays of a cell, and of one of a micro scene. */
+enum { CELL_RAYS = 1000000, SHORT_CELL_RAYS = 30000, MICRO_CELL_RAYS = 20000 };
+
+static uint32_t rays_of(soak_style style, bool full)
+{
+    switch (style) {
+    case SOAK_MICRO:
+        return 60000;
+    case SOAK_CELLS:
+        return full ? CELL_RAYS : SHORT_CELL_RAYS;
+    case SOAK_MICRO_CELLS:
+        return MICRO_CELL_RAYS;
+    default:
+        return 100000;
+    }
+}
+
+static bool add(soak_plan *p, const scene_row *row, soak_style style, bool full, double views)
 {
     if (views < 1.0) {
         return true;
@@ -50,8 +75,8 @@ static bool add(soak_plan *p, const scene_row *row, soak_style style, double vie
     p->parts = more;
     soak_part *part = &more[p->count++];
     memset(part, 0, sizeof *part);
-    (void)snprintf(part->name, sizeof part->name, "%s%s", row->name,
-                   style == SOAK_ADVERSARIAL ? "-adversarial" : "");
+    static const char *const suffixes[] = {"", "-adversarial", "", "-cells", "-cells"};
+    (void)snprintf(part->name, sizeof part->name, "%s%s", row->name, suffixes[style]);
     (void)snprintf(part->scene, sizeof part->scene, "%s", row->scene);
     part->family = row->family;
     part->style = style;
@@ -59,15 +84,17 @@ static bool add(soak_plan *p, const scene_row *row, soak_style style, double vie
     part->shift = row->shift;
     part->weld = row->weld;
     part->most_targets = style == SOAK_MICRO ? 4000 : 400;
-    part->rays = style == SOAK_MICRO ? 60000 : 100000;
+    part->rays = rays_of(style, full);
     part->most_decided = style == SOAK_ADVERSARIAL ? 8 : 16;
     return true;
 }
 
-static bool add_both(soak_plan *p, const scene_row *row, bool full, double scale)
+static bool add_styles(soak_plan *p, const scene_row *row, bool full, double scale)
 {
-    return add(p, row, SOAK_ORDINARY, scale * (full ? row->ordinary : row->short_ordinary)) &&
-           add(p, row, SOAK_ADVERSARIAL, scale * (full ? row->adversarial : row->short_adversarial));
+    uint32_t adversarial = full ? row->adversarial : row->short_adversarial;
+    return add(p, row, SOAK_ORDINARY, full, scale * (full ? row->ordinary : row->short_ordinary)) &&
+           add(p, row, SOAK_ADVERSARIAL, full, scale * adversarial) &&
+           add(p, row, SOAK_CELLS, full, scale * (full ? row->cells : row->short_cells));
 }
 
 static bool add_real(soak_plan *p, double scale, umb_error *error)
@@ -89,8 +116,9 @@ static bool add_real(soak_plan *p, double scale, umb_error *error)
                          .scene = all.scenes[i].file,
                          .weld = true,
                          .ordinary = REAL_ORDINARY,
-                         .adversarial = REAL_ADVERSARIAL};
-        ok = add_both(p, &row, true, scale);
+                         .adversarial = REAL_ADVERSARIAL,
+                         .cells = REAL_CELLS};
+        ok = add_styles(p, &row, true, scale);
     }
     real_scenes_free(&all);
     return ok;
@@ -101,11 +129,12 @@ bool soak_plan_make(bool full, double scale, soak_plan *out, umb_error *error)
     *out = (soak_plan){0};
     bool ok = true;
     for (int k = 0; ok && k < ROW_COUNT; ++k) {
-        ok = add_both(out, &ROWS[k], full, scale);
+        ok = add_styles(out, &ROWS[k], full, scale);
     }
     ok = ok && (!full || add_real(out, scale, error));
     scene_row micro = {.family = "micro scenes", .name = "micro", .scene = "micro"};
-    ok = ok && add(out, &micro, SOAK_MICRO, scale * (full ? MICRO_VIEWS : SHORT_MICRO));
+    ok = ok && add(out, &micro, SOAK_MICRO, full, scale * (full ? MICRO_VIEWS : SHORT_MICRO));
+    ok = ok && add(out, &micro, SOAK_MICRO_CELLS, full, scale * (full ? MICRO_VIEWS : SHORT_MICRO));
     if (!ok) {
         soak_plan_free(out);
         if (error->text[0] == '\0') {
@@ -191,7 +220,7 @@ bool soak_scene_load(const soak_part *part, plant planted, soak_scene *out, umb_
     out->shift = part->shift;
     out->weld = part->weld;
     out->planted = planted;
-    if (part->style == SOAK_MICRO) {
+    if (part->style == SOAK_MICRO || part->style == SOAK_MICRO_CELLS) {
         return true;
     }
     (void)snprintf(error->text, sizeof error->text, "%.200s: not enough memory", part->scene);

@@ -241,14 +241,68 @@ static bool micro_view(bench *b, uint64_t number, soak_count *sum)
     return ok;
 }
 
+static bool cell_batch(bench *b, uint64_t first, uint64_t last, soak_count *sum)
+{
+    const soak_scene *s = b->crew->run->scene;
+    uint64_t batch = first / SOAK_BATCH;
+    umb_error error = {0};
+    umb_region *region = NULL;
+    umb_region_def def = {.isa = isa_of(batch), .error = &error};
+    umb_index *index = s->flat != NULL && batch % 5 == 4 ? s->flat : s->index;
+    soak_judge judge = {b->crew->run->part, s->model, s->oracle, b->crew->run->folder, b->print};
+    bool ok = umb_region_create(index, &def, &region) == UMB_OK;
+    for (uint64_t k = first; ok && k < last; ++k) {
+        ok = soak_judge_cell(&judge, region, &s->path, k, sum, &error);
+    }
+    umb_region_destroy(region);
+    return ok || fail(b->crew, "a cell", &error);
+}
+
+static bool micro_cell(bench *b, uint64_t number, soak_count *sum)
+{
+    micro_scene micro = {0};
+    umb_error error = {0};
+    umb_tasks tasks = {0};
+    if (!micro_scene_make(number, &micro)) {
+        return fail(b->crew, "a micro scene", &(umb_error){.text = "not enough memory"});
+    }
+    plant planted = b->crew->run->scene->planted;
+    umb_scene *scene = planted == PLANT_NONE
+                           ? model_scene(micro.model, micro.weld, tasks, NULL, &error)
+                           : planted_scene(micro.model, planted, micro.weld);
+    truth *oracle = truth_create(micro.model, &error);
+    umb_index *index = NULL;
+    umb_region *region = NULL;
+    umb_index_def flat = {.kind = number % 7 == 0 ? UMB_INDEX_FLAT : UMB_INDEX_BVH};
+    umb_region_def def = {.isa = isa_of(number / 8), .error = &error};
+    double row[6] = {micro.view.eye[0], micro.view.eye[1], micro.view.eye[2]};
+    camera_path path = {.rows = &row, .count = 1};
+    soak_judge judge = {b->crew->run->part, micro.model, oracle, b->crew->run->folder, b->print};
+    bool ok = scene != NULL && oracle != NULL && umb_index_create(scene, &flat, &index) == UMB_OK &&
+              umb_region_create(index, &def, &region) == UMB_OK &&
+              soak_judge_cell(&judge, region, &path, number, sum, &error);
+    umb_region_destroy(region);
+    umb_index_destroy(index);
+    umb_scene_destroy(scene);
+    if (oracle != NULL) {
+        truth_destroy(oracle);
+    }
+    micro_scene_free(&micro);
+    return ok || fail(b->crew, "a micro scene", &error);
+}
+
 static bool run_views(bench *b, uint64_t first, uint64_t last, soak_count *sum)
 {
-    if (b->crew->run->part->style != SOAK_MICRO) {
+    soak_style style = b->crew->run->part->style;
+    if (style == SOAK_CELLS) {
+        return cell_batch(b, first, last, sum);
+    }
+    if (style != SOAK_MICRO && style != SOAK_MICRO_CELLS) {
         return scene_batch(b, first, last, sum);
     }
     bool ok = true;
     for (uint64_t k = first; ok && k < last; ++k) {
-        ok = micro_view(b, k, sum);
+        ok = style == SOAK_MICRO ? micro_view(b, k, sum) : micro_cell(b, k, sum);
     }
     return ok;
 }
