@@ -147,6 +147,7 @@ static void check_map(bool roof)
                          PICTURE_HIDDEN};
     bitmap large;
     map p = {.m = s->m, .view = &s->view, .states = states};
+    memcpy(p.eye, s->view.eye, sizeof p.eye);
     assert_true(bitmap_create(&large, 800, 600));
     choose_axes(&p);
     assert_true(choose_window(&p, 800, 600));
@@ -181,6 +182,39 @@ static void test_map(void **state)
     (void)state;
     check_map(false);
     check_map(true);
+}
+
+/* The map of a cell holds what may be seen from there, and shows the cell. */
+static void test_cell_map(void **state)
+{
+    (void)state;
+    stage *s = set_up(false);
+    uint8_t states[4] = {PICTURE_OUTSIDE, PICTURE_HIDDEN, PICTURE_VISIBLE, PICTURE_OUTSIDE};
+    const double cell[2][3] = {{-1, 1, -1}, {1, 2, 1}};
+    bitmap large;
+    map p = {.m = s->m, .cell = cell, .states = states};
+    assert_true(bitmap_create(&large, 800, 600));
+    assert_true(picture_cell_map(&large, s->m, cell, states));
+    choose_axes(&p);
+    assert_true(choose_window(&p, 800, 600));
+    for (uint32_t o = 1; o < 3; ++o) {
+        const umb_aabb *b = &s->m->objects[o].bounds;
+        double middle[3], page[3];
+        for (int i = 0; i < 3; ++i) {
+            /* Below the legend. */
+            middle[i] = 0.1 * b->min[i] + 0.9 * b->max[i];
+        }
+        place(&p, middle, page);
+        assert_true(page[0] > 0 && page[0] < p.width && page[1] > 0 && page[1] < p.height);
+        bitmap_color c = bitmap_get(&large, (int)page[0] / FINE, (int)page[1] / FINE);
+        assert_int_equal(nearest_state(c), states[o]);
+    }
+    double page[3];
+    place(&p, p.eye, page);
+    bitmap_color c = bitmap_get(&large, (int)page[0] / FINE, (int)page[1] / FINE);
+    assert_true((c >> 16) > 0xC0 && (c & 255) < 0x80);
+    bitmap_free(&large);
+    tear_down(s);
 }
 
 static void test_occlusion(void **state)
@@ -253,8 +287,9 @@ static void test_depths(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_states),    cmocka_unit_test(test_ids),
-        cmocka_unit_test(test_eye),       cmocka_unit_test(test_map),
-        cmocka_unit_test(test_occlusion), cmocka_unit_test(test_depths)};
+        cmocka_unit_test(test_states),   cmocka_unit_test(test_ids),
+        cmocka_unit_test(test_eye),      cmocka_unit_test(test_map),
+        cmocka_unit_test(test_cell_map), cmocka_unit_test(test_occlusion),
+        cmocka_unit_test(test_depths)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

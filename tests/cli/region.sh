@@ -16,5 +16,9 @@ run region $scene $cell --rays 0 --json
 jq -c 'has("seen")' out
 run region $scene $cell --rays 20k
 grep -c '^seen ' out
+run region $scene $cell --rays 20k --picture map.png --size 320x200
+head -c 4 map.png | tail -c 3
+echo
+run region $scene $cell --rays 20k --picture none/map.png
 run region $scene $cell --check --rays 100k --near 0.5 --two-sided --json
 jq -c '.wrongly_hidden' out

@@ -1,6 +1,7 @@
 /* umbrage region: what may be seen from a view cell. */
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "part_file.h"
@@ -118,6 +119,28 @@ static umb_result solve(const options *o, umb_region *region, const umb_region_q
     return result;
 }
 
+static int paint(const setup *s, const options *o, const umb_region_query *q, const report *r)
+{
+    bitmap im = {0};
+    double cell[2][3];
+    memcpy(cell[0], q->min, sizeof cell[0]);
+    memcpy(cell[1], q->max, sizeof cell[1]);
+    uint8_t *states = malloc((size_t)s->model->object_count + 1);
+    int code = EXIT_DONE;
+    if (states != NULL) {
+        region_check_states(&r->check, r->answer, s->model, states);
+    }
+    if (states == NULL || !bitmap_create(&im, o->width, o->height) ||
+        !picture_cell_map(&im, s->model, (const double(*)[3])cell, states)) {
+        code = fail(o, EXIT_INPUT, "not enough memory for the picture");
+    } else {
+        code = part_file_picture(o, &im, o->output);
+    }
+    bitmap_free(&im);
+    free(states);
+    return code;
+}
+
 static int answer(const setup *s, const options *o, umb_region *region, const umb_region_query *query)
 {
     umb_region_answer a;
@@ -129,6 +152,9 @@ static int answer(const setup *s, const options *o, umb_region *region, const um
     int code = region_check_run(s, o, query, &a, &r.check);
     if (code == EXIT_DONE) {
         code = options_given(o, "json") ? print_json(s, o, &r) : print_text(s, o, &r);
+    }
+    if (code == EXIT_DONE && options_given(o, "picture")) {
+        code = paint(s, o, query, &r);
     }
     if (code == EXIT_DONE) {
         code = region_check_code(&r.check);

@@ -57,21 +57,6 @@ static bool paint(const easel *e, uint32_t kind, bitmap *im)
     }
 }
 
-static int save(const options *o, const bitmap *im, const char *name)
-{
-    umb_error error = {0};
-    const char *place = part_file_begin(name);
-    if (!place) {
-        return fail(o, EXIT_INPUT, "%s: not enough memory", name);
-    }
-    bool good = bitmap_write_png(im, place, &error);
-    if (!part_file_end(good) || !good) {
-        return fail(o, EXIT_INPUT, "%s: cannot be written; name a folder that exists and has space",
-                    name);
-    }
-    return EXIT_DONE;
-}
-
 static int paint_one(const easel *e, int k)
 {
     const options *o = e->o;
@@ -81,7 +66,7 @@ static int paint_one(const easel *e, int k)
     if (!name || !bitmap_create(&im, o->width, o->height) || !paint(e, kinds[k].bit, &im)) {
         code = fail(o, EXIT_INPUT, "not enough memory for the picture");
     } else {
-        code = save(o, &im, name);
+        code = part_file_picture(o, &im, name);
     }
     if (code == EXIT_DONE && !options_given(o, "json")) {
         printf("%s\n", name);

@@ -128,6 +128,21 @@ int part_file_write(const options *o, const char *path, const void *bytes, size_
                 : fail(o, EXIT_INPUT, "%s: cannot be written: %s", path, strerror(reason));
 }
 
+int part_file_picture(const options *o, const bitmap *im, const char *path)
+{
+    umb_error error = {0};
+    const char *place = part_file_begin(path);
+    if (!place) {
+        return fail(o, EXIT_INPUT, "%s: not enough memory", path);
+    }
+    bool good = bitmap_write_png(im, place, &error);
+    if (!part_file_end(good) || !good) {
+        return fail(o, EXIT_INPUT, "%s: cannot be written; name a folder that exists and has space",
+                    path);
+    }
+    return EXIT_DONE;
+}
+
 int part_file_print(const options *o, json_text *j)
 {
     if (j->failed) {

@@ -3,6 +3,7 @@
 #ifndef PART_FILE_H
 #define PART_FILE_H
 
+#include "io/bitmap.h"
 #include "json_text.h"
 #include "options.h"
 
@@ -18,6 +19,9 @@ bool part_file_end(bool keep);
 
 /* Write a whole file. EXIT_DONE, or EXIT_INPUT with the message printed. */
 int part_file_write(const options *o, const char *path, const void *bytes, size_t size);
+
+/* The same for a picture. */
+int part_file_picture(const options *o, const bitmap *im, const char *path);
 
 /* Write the text and a newline to standard output, and free it; an interrupt waits until it is
  * out. */

@@ -38,4 +38,9 @@ bool picture_occlusion(bitmap *im, const model *m, const umb_culler *culler, con
  * nothing else is. A visible storey shows through hidden ones above it. */
 bool picture_map(bitmap *im, const model *m, const umb_view *view, const uint8_t *states);
 
+/* The map around a view cell, as much of it as holds what may be seen from there. States: PICTURE_VISIBLE
+ * for what a ray saw, PICTURE_HIDDEN for what the method reported and no ray saw, PICTURE_OUTSIDE for what is
+ * proved hidden. */
+bool picture_cell_map(bitmap *im, const model *m, const double cell[2][3], const uint8_t *states);
+
 #endif

@@ -2,6 +2,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "picture.h"
 
@@ -10,6 +11,7 @@ enum { FINE = 2 }; /* samples to a pixel, each way */
 static const bitmap_color paper = 0xF7F5F0, ink = 0x2B2D33, wedge_color = 0xF2B705;
 static const bitmap_color state_colors[3] = {0xCDD1D6, 0xE58A6B, 0x1F8A85};
 static const char *const state_names[3] = {"outside the view", "hidden", "visible"};
+static const char *const cell_names[3] = {"hidden", "not seen, not proved hidden", "seen"};
 
 /* What lies under a fine pixel. */
 typedef struct map_pixel {
@@ -21,8 +23,11 @@ typedef struct map_pixel {
 
 typedef struct map {
     const model *m;
-    const umb_view *view;
-    int across, down, up; /* axes of the page and of height */
+    const umb_view *view;     /* NULL: of a cell */
+    const double (*cell)[3];  /* least and largest corner; NULL: of a view */
+    double eye[3];            /* the view's; the middle of the cell */
+    const char *const *names; /* of the states */
+    int across, down, up;     /* axes of the page and of height */
     double across_sign, down_sign, up_sign;
     double left, top, scale; /* fine pixels = (coordinate - left) * scale */
     double cut;              /* heights above are cut away: faint, and under all others */
@@ -60,11 +65,19 @@ static int compare_floats(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
+/* Of a cell, what may be seen from it. */
+static bool on_map(const map *p, uint32_t object)
+{
+    return p->m->objects[object].mesh != MODEL_NONE &&
+           (p->cell == NULL || p->states[object] != PICTURE_OUTSIDE);
+}
+
 /* The span that holds all but the outermost hundredth of the objects' boxes at either end, or,
  * where the outer tenths lie far out, little more than the rest: a few stray objects must not
  * shrink the map to a dot. */
-static bool span_of(const model *m, int axis, double sign, double *low, double *high)
+static bool span_of(const map *p, int axis, double sign, double *low, double *high)
 {
+    const model *m = p->m;
     float *ends = malloc(2 * sizeof *ends * ((size_t)m->object_count + 1));
     uint32_t count = 0;
     if (!ends) {
@@ -73,7 +86,7 @@ static bool span_of(const model *m, int axis, double sign, double *low, double *
     float *mins = ends, *maxes = ends + m->object_count;
     for (uint32_t o = 0; o < m->object_count; ++o) {
         const umb_aabb *b = &m->objects[o].bounds;
-        if (m->objects[o].mesh != MODEL_NONE) {
+        if (on_map(p, o)) {
             mins[count] = (float)(sign > 0 ? b->min[axis] : -b->max[axis]);
             maxes[count++] = (float)(sign > 0 ? b->max[axis] : -b->min[axis]);
         }
@@ -101,16 +114,18 @@ static bool span_of(const model *m, int axis, double sign, double *low, double *
 /* The part of the world on the page: the scene's span and the eye, with a margin, centred. */
 static bool choose_window(map *p, uint32_t width, uint32_t height)
 {
-    double low[2], high[2],
-        eye[2] = {p->across_sign * p->view->eye[p->across], p->down_sign * p->view->eye[p->down]};
-    if (!span_of(p->m, p->across, p->across_sign, &low[0], &high[0]) ||
-        !span_of(p->m, p->down, p->down_sign, &low[1], &high[1]) ||
-        !span_of(p->m, p->up, p->up_sign, &p->low, &p->high)) {
+    double low[2], high[2];
+    double eye[2] = {p->across_sign * p->eye[p->across], p->down_sign * p->eye[p->down]};
+    if (!span_of(p, p->across, p->across_sign, &low[0], &high[0]) ||
+        !span_of(p, p->down, p->down_sign, &low[1], &high[1]) ||
+        !span_of(p, p->up, p->up_sign, &p->low, &p->high)) {
         return false;
     }
     for (int i = 0; i < 2; ++i) {
-        low[i] = fmin(low[i], eye[i]);
-        high[i] = fmax(high[i], eye[i]);
+        int axis = i ? p->down : p->across;
+        double half = p->cell != NULL ? 0.6 * (p->cell[1][axis] - p->cell[0][axis]) : 0;
+        low[i] = fmin(low[i], eye[i] - half);
+        high[i] = fmax(high[i], eye[i] + half);
     }
     p->width = width * FINE;
     p->height = height * FINE;
@@ -240,9 +255,26 @@ static bool triangle_of(const model *m, const model_object *o, uint32_t triangle
     return length > 0;
 }
 
+/* Of large scenes the map of a cell shows a small part. */
+static bool on_page(const map *p, const umb_aabb *box)
+{
+    double a[3], b[3], low[3], high[3];
+    for (int i = 0; i < 3; ++i) {
+        low[i] = box->min[i];
+        high[i] = box->max[i];
+    }
+    place(p, low, a);
+    place(p, high, b);
+    return fmax(a[0], b[0]) >= 0 && fmin(a[0], b[0]) <= p->width && fmax(a[1], b[1]) >= 0 &&
+           fmin(a[1], b[1]) <= p->height;
+}
+
 static void draw_object(map *p, uint32_t object)
 {
     const model_object *o = &p->m->objects[object];
+    if (!on_page(p, &o->bounds)) {
+        return;
+    }
     bool mirrored = model_mirrored(o);
     for (uint32_t k = 0; k < p->m->meshes[o->mesh].triangle_count; ++k) {
         double world[3][3], page[3][3], normal[3];
@@ -269,7 +301,7 @@ static void draw_object(map *p, uint32_t object)
 static double choose_cut(const map *p)
 {
     double eye[3];
-    place(p, p->view->eye, eye);
+    place(p, p->eye, eye);
     for (uint32_t o = 0; o < p->m->object_count; ++o) {
         const model_object *object = &p->m->objects[o];
         double low[3], high[3];
@@ -279,8 +311,8 @@ static double choose_cut(const map *p)
         }
         if (object->mesh == MODEL_NONE ||
             fmax(p->up_sign * low[p->up], p->up_sign * high[p->up]) < eye[2] ||
-            p->view->eye[p->across] < low[p->across] || p->view->eye[p->across] > high[p->across] ||
-            p->view->eye[p->down] < low[p->down] || p->view->eye[p->down] > high[p->down]) {
+            p->eye[p->across] < low[p->across] || p->eye[p->across] > high[p->across] ||
+            p->eye[p->down] < low[p->down] || p->eye[p->down] > high[p->down]) {
             continue;
         }
         bool mirrored = model_mirrored(object);
@@ -409,10 +441,29 @@ static void draw_wedge(const map *p, bitmap *im)
     }
 }
 
+/* The cell's outline on the page, never less than a few pixels wide. */
+static void draw_cell(const map *p, bitmap *im)
+{
+    double a[3], b[3];
+    place(p, p->cell[0], a);
+    place(p, p->cell[1], b);
+    for (int i = 0; i < 2; ++i) {
+        double middle = (a[i] + b[i]) / 2 / FINE, half = fmax(fabs(a[i] - b[i]) / 2 / FINE, 3);
+        a[i] = middle - half;
+        b[i] = middle + half;
+    }
+    const double corners[4][2] = {{a[0], a[1]}, {b[0], a[1]}, {b[0], b[1]}, {a[0], b[1]}};
+    bitmap_polygon(im, corners, 4, wedge_color, 0.8);
+    for (int k = 0; k < 4; ++k) {
+        const double *c = corners[k], *d = corners[(k + 1) % 4];
+        bitmap_line(im, c[0], c[1], d[0], d[1], 2, ink, 1);
+    }
+}
+
 static void draw_eye(const map *p, bitmap *im)
 {
     double eye[3];
-    place(p, p->view->eye, eye);
+    place(p, p->eye, eye);
     bitmap_disc(im, eye[0] / FINE, eye[1] / FINE, 7.5, 0xFFFFFF, 1);
     bitmap_disc(im, eye[0] / FINE, eye[1] / FINE, 6, ink, 1);
     bitmap_disc(im, eye[0] / FINE, eye[1] / FINE, 2.5, wedge_color, 1);
@@ -430,7 +481,7 @@ static void choose_corner(const map *p, const bitmap *im, int wide, int tall, in
                           int *y)
 {
     double least = INFINITY, eye[3];
-    place(p, p->view->eye, eye);
+    place(p, p->eye, eye);
     for (int k = 0; k < 4; ++k) {
         int left = k & 1 ? (int)im->width - margin - wide : margin;
         int top = k & 2 ? margin : (int)im->height - margin - tall;
@@ -461,7 +512,7 @@ static void draw_legend(const map *p, bitmap *im, const uint8_t *states)
     double bar = round_length(im->width * 0.18 * FINE / p->scale),
            bar_pixels = bar * p->scale / FINE;
     for (int k = 0; k < 3; ++k) {
-        snprintf(text[k], sizeof text[k], "%u %s", counts[2 - k], state_names[2 - k]);
+        snprintf(text[k], sizeof text[k], "%u %s", counts[2 - k], p->names[2 - k]);
     }
     snprintf(text[3], sizeof text[3], "%g", bar);
     for (int k = 0; k < 4; ++k) {
@@ -486,40 +537,61 @@ static void draw_legend(const map *p, bitmap *im, const uint8_t *states)
     bitmap_text(im, x + (int)bar_pixels + 4 * s, y, s, text[3], ink);
 }
 
-bool picture_map(bitmap *im, const model *m, const umb_view *view, const uint8_t *states)
+static bool draw_map(map *p, bitmap *im)
 {
-    map p = {.m = m, .view = view, .states = states};
     bitmap fine = {0};
-    double outline[9][2];
-    choose_axes(&p);
-    if (!choose_window(&p, im->width, im->height)) {
+    choose_axes(p);
+    if (!choose_window(p, im->width, im->height)) {
         return false;
     }
-    size_t count = (size_t)p.width * p.height;
-    p.pixels = malloc(count * sizeof *p.pixels);
-    if (!p.pixels || !bitmap_create(&fine, p.width, p.height)) {
-        free(p.pixels);
+    size_t count = (size_t)p->width * p->height;
+    p->pixels = malloc(count * sizeof *p->pixels);
+    if (!p->pixels || !bitmap_create(&fine, p->width, p->height)) {
+        free(p->pixels);
         return false;
     }
     for (size_t k = 0; k < count; ++k) {
-        p.pixels[k] = (map_pixel){.object = MODEL_NONE, .seen = MODEL_NONE};
+        p->pixels[k] = (map_pixel){.object = MODEL_NONE, .seen = MODEL_NONE};
     }
-    p.tie = 1e-4 * (p.high - p.low);
-    p.cut = choose_cut(&p);
-    for (uint32_t o = 0; o < m->object_count; ++o) {
-        if (m->objects[o].mesh != MODEL_NONE) {
-            draw_object(&p, o);
+    p->tie = 1e-4 * (p->high - p->low);
+    p->cut = choose_cut(p);
+    for (uint32_t o = 0; o < p->m->object_count; ++o) {
+        if (p->m->objects[o].mesh != MODEL_NONE) {
+            draw_object(p, o);
         }
     }
     bitmap_fill(&fine, paper);
-    uint32_t corners = wedge(&p, outline);
-    bitmap_polygon(&fine, (const double(*)[2])outline, corners, wedge_color, 0.25);
-    paint(&p, &fine);
+    if (p->view != NULL) {
+        double outline[9][2];
+        uint32_t corners = wedge(p, outline);
+        bitmap_polygon(&fine, (const double(*)[2])outline, corners, wedge_color, 0.25);
+    }
+    paint(p, &fine);
     bitmap_shrink(im, &fine, FINE);
-    draw_wedge(&p, im);
-    draw_eye(&p, im);
-    draw_legend(&p, im, states);
-    free(p.pixels);
     bitmap_free(&fine);
+    if (p->view != NULL) {
+        draw_wedge(p, im);
+        draw_eye(p, im);
+    } else {
+        draw_cell(p, im);
+    }
+    draw_legend(p, im, p->states);
+    free(p->pixels);
     return true;
+}
+
+bool picture_map(bitmap *im, const model *m, const umb_view *view, const uint8_t *states)
+{
+    map p = {.m = m, .view = view, .states = states, .names = state_names};
+    memcpy(p.eye, view->eye, sizeof p.eye);
+    return draw_map(&p, im);
+}
+
+bool picture_cell_map(bitmap *im, const model *m, const double cell[2][3], const uint8_t *states)
+{
+    map p = {.m = m, .cell = cell, .states = states, .names = cell_names};
+    for (int i = 0; i < 3; ++i) {
+        p.eye[i] = (cell[0][i] + cell[1][i]) / 2;
+    }
+    return draw_map(&p, im);
 }

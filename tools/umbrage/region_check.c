@@ -74,6 +74,20 @@ int region_check_run(const setup *s, const options *o, const umb_region_query *q
     return code;
 }
 
+void region_check_states(const region_check *c, const umb_region_answer *answer, const model *m,
+                         uint8_t *states)
+{
+    memset(states, PICTURE_OUTSIDE, m->object_count);
+    for (uint32_t i = 0; i < answer->refined_count; ++i) {
+        states[answer->refined[i]] = PICTURE_HIDDEN;
+    }
+    for (uint32_t i = 0; c->done && i < m->object_count; ++i) {
+        if (c->result.witness_of[i] != MODEL_NONE) {
+            states[i] = PICTURE_VISIBLE;
+        }
+    }
+}
+
 void region_check_free(region_check *c)
 {
     region_result_free(&c->result);

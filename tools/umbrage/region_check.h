@@ -3,6 +3,7 @@
 #define REGION_CHECK_H
 
 #include "json_text.h"
+#include "picture.h"
 #include "setup.h"
 #include "truth/region_truth.h"
 #include "umbrage/region.h"
@@ -17,6 +18,9 @@ typedef struct region_check {
  * only. EXIT_DONE, or another code with the message printed. */
 int region_check_run(const setup *s, const options *o, const umb_region_query *query,
                      const umb_region_answer *answer, region_check *out);
+/* Per object what became of it, as picture_cell_map() wants it. */
+void region_check_states(const region_check *c, const umb_region_answer *answer, const model *m,
+                         uint8_t *states);
 void region_check_free(region_check *c);
 
 /* Into an open JSON object. */
