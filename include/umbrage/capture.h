@@ -12,7 +12,7 @@ extern "C" {
 
 /* Write the frame that the culler answered last into bytes, if capacity allows; *size is always set
  * to the bytes needed. Pass bytes NULL, capacity 0 to ask. UMB_ERROR_STATE before the first
- * umb_cull, and when the scene has changed since; UMB_ERROR_ARGUMENT when bytes is not NULL and
+ * umb_cull, when the scene has changed since, and when it has objects that move by themselves (motion.h); UMB_ERROR_ARGUMENT when bytes is not NULL and
  * capacity is too small (nothing is written). */
 UMB_API umb_result umb_capture_save(const umb_culler *culler, void *bytes, size_t capacity, size_t *size);
 

@@ -91,6 +91,12 @@ typedef struct umb_cull_stats {
     uint32_t saved;        /* boxes not tested for occlusion, thanks to what was remembered */
     uint32_t resting;      /* occluders not drawn by UMB_COHERENCE_REST */
     uint32_t over_budget;  /* occluders not drawn by the budget */
+    /* Moving objects (motion.h). */
+    uint32_t poses;        /* that were asked for: volumes seen, and volumes that did not hold at the view's time */
+    uint32_t expired;      /* of these, the latter */
+    uint32_t strays;       /* of the former, objects outside of the volume that was to hold them: a broken promise, or
+                              a fuzzy one */
+    uint32_t hidden_movers; /* moving objects that nobody had to ask for */
 } umb_cull_stats;
 
 /* The answer. Borrowed: valid until the culler's next call. */
@@ -113,7 +119,8 @@ UMB_API void umb_culler_destroy(umb_culler *culler);
  * direction: may report a hidden object visible; never the reverse, provided every object's bounds
  * contain what is drawn for it and every occluder lies inside what is drawn. Threads: one call at a
  * time for each culler. Cost: proportional to what is seen. Errors: an impossible view
- * (umb_view_check), no memory. *out is then empty. */
+ * (umb_view_check), no memory. *out is then empty. Objects that move by themselves (motion.h) are asked for through
+ * the scene's callback, if their volumes are seen: it must not call this culler. */
 UMB_API umb_result umb_cull(umb_culler *culler, const umb_view *view, umb_visible_set *out);
 
 /* The occlusion buffer after the last umb_cull, as the view sees it: the picture in as many columns and rows as

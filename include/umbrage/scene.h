@@ -75,7 +75,8 @@ UMB_API umb_result umb_scene_add_shape(umb_scene *scene, const umb_shape_def *de
  * after the next commit. */
 UMB_API umb_result umb_scene_add_object(umb_scene *scene, const umb_object_def *def, uint32_t *out);
 /* Give an object a new place. transform NULL: the identity; bounds NULL: the shape's own. Moving a
- * welded object dissolves the welds it is part of: their members hide by their own shapes. */
+ * welded object dissolves the welds it is part of: their members hide by their own shapes. UMB_ERROR_STATE for objects
+ * that move by themselves (motion.h). */
 UMB_API umb_result umb_scene_move_object(umb_scene *scene, uint32_t object,
                                          const umb_transform *transform, const umb_aabb *bounds);
 /* Replace the UMB_OBJECT_* flags of an object. Dissolves welds as moving does. */
@@ -125,7 +126,7 @@ UMB_API umb_result umb_scene_commit(umb_scene *scene);
 
 /* Number of object ids in use or free: every id is below it. */
 UMB_API uint32_t umb_scene_object_count(const umb_scene *scene);
-/* Bounds of an object as committed; false if the id is free. */
+/* Bounds of an object as committed; false if the id is free. Of one that moves by itself (motion.h): its volume. */
 UMB_API bool umb_scene_object_bounds(const umb_scene *scene, uint32_t object, umb_aabb *out);
 /* Number of occluders as committed: shapes of objects that hide by themselves, welded ones,
  * hand-made. */

@@ -10,6 +10,7 @@
 #include "geometry.h"
 #include "index.h"
 #include "light.h"
+#include "motion.h"
 #include "region.h"
 #include "scene.h"
 #include "view.h"

@@ -51,7 +51,7 @@ typedef struct umb_view {
        any convex frustum can be said. What lies outside is not in view; it may still hide. */
     uint32_t plane_count;
     double planes[UMB_MAX_CLIP_PLANES][4];
-    double time; /* seconds; kept with a capture, nothing of this version depends on it */
+    double time; /* seconds, finite: objects that move by themselves are seen where they are then (motion.h) */
 } umb_view;
 
 /* Conventions of a matrix that umb_view_from_matrix() is given. */

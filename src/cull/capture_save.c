@@ -272,6 +272,10 @@ umb_result umb_capture_save(const umb_culler *culler, void *bytes, size_t capaci
     s.scene = umb_index_scene(index);
     s.committed = umb_scene_committed(s.scene);
     s.tree = umb_index_tree(index);
+    if (s.committed->motion.count > 0) {
+        return umb_error_set(umb_culler_settings(culler).error, UMB_ERROR_STATE,
+                             "captures hold no objects that move by themselves: end their motions first");
+    }
     umb_scratch scratch = {.allocator = umb_scene_allocator(s.scene)};
     umb_result result = UMB_OK;
     if (!gather_meshes(&s, &scratch)) {

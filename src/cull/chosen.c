@@ -16,9 +16,10 @@ void umb_chosen_free(umb_chosen_room *room, const umb_allocator *a)
     *room = (umb_chosen_room){0};
 }
 
+/* Of an object that moves by itself only its volume is known here. */
 static bool object_hidden(umb_chosen *v, uint32_t object, uint32_t token)
 {
-    return v->ops->hides_object != NULL && token != UMB_TOKEN_CLEAR &&
+    return v->choice->scene->objects[object].mover == UMB_NONE && v->ops->hides_object != NULL && token != UMB_TOKEN_CLEAR &&
            v->ops->hides_object(v->method, object, token);
 }
 

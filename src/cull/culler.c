@@ -27,6 +27,7 @@
 #include "heap.h"
 #include "in_view.h"
 #include "index/tree.h"
+#include "movers.h"
 #include "occlusion/image.h"
 #include "occlusion/method.h"
 #include "once.h"
@@ -58,6 +59,7 @@ struct umb_culler {
     size_t found_capacity, scratch_capacity, object_capacity, inside_capacity, plane_capacity, row_capacity;
     umb_past past;
     umb_once once;
+    umb_movers movers;
     uint32_t count;
     bool answered;
     umb_view view;    /* of the last answer */
@@ -120,6 +122,7 @@ umb_result umb_culler_create(const umb_index *index, const umb_culler_def *def, 
         umb_memory_free(allocator, c, sizeof *c);
         return umb_error_set(def->error, UMB_ERROR_MEMORY, "no memory for a culler");
     }
+    umb_movers_start(&c->movers, umb_index_scene(index));
     *out = c;
     return UMB_OK;
 }
@@ -136,6 +139,7 @@ void umb_culler_destroy(umb_culler *c)
     umb_heap_free(&c->heap, &a);
     umb_past_free(&c->past, &a);
     umb_once_free(&c->once, &a);
+    umb_movers_end(&c->movers, umb_index_scene(c->index), &a);
     umb_in_view_free(&c->room, &a);
     umb_chosen_free(&c->chosen_room, &a);
     umb_memory_free(&a, c->found, c->found_capacity * sizeof *c->found);
@@ -160,14 +164,14 @@ static bool reserve_answer(umb_culler *c, const umb_tree *tree)
 }
 
 /* Everything that a walk can need, so that it never allocates: each slot and node waits at most
- * once, and occluders drawn early are gone before the walk begins. */
+ * once, a moving object once more, and occluders drawn early are gone before the walk begins. */
 static bool reserve(umb_culler *c, const umb_view *view, const umb_tree *tree, const umb_committed *scene)
 {
     const umb_allocator *a = &c->allocator;
     size_t planes = c->plane_capacity;
     uint32_t width, height;
     umb_raster_map_size(view, &width, &height);
-    size_t waiting = (size_t)tree->item_count + tree->node_count, early = scene->occluder_count;
+    size_t waiting = (size_t)tree->item_count + tree->node_count + scene->motion.number_count, early = scene->occluder_count;
     if (!umb_memory_reserve(a, (void **)&c->rows, &c->row_capacity, umb_raster_map_table(height),
                             sizeof *c->rows) ||
         (tree->several && !umb_once_begin(&c->once, a, scene)) ||
@@ -446,6 +450,9 @@ static void draw(walk *w, uint32_t occluder, const umb_waiting *item)
         uint32_t before = w->stats.occluders, tiles = c->ops->occlude(c->method, occluder, &w->stats);
         w->drawn += tiles != 0;
         umb_past_drew(past, occluder, rect, tiles, !mesh->convex);
+        if (w->scene->occluders[occluder].moves) {
+            umb_past_unlist(past, occluder);
+        }
         if (w->stats.occluders == before) {
             umb_past_refund(past);
         }
@@ -473,6 +480,9 @@ static void report(walk *w, const umb_waiting *item)
     uint32_t id = item->ref & UMB_REF_NUMBER;
     c->found[c->count++] = umb_found_entry(item->nearest, id, item->planes == 0);
     settle(w, id);
+    if (w->scene->motion.count > 0) {
+        umb_movers_show(&c->movers, id);
+    }
     if (umb_past_knows(&c->past)) {
         umb_past_saw(&c->past, w->tree, id, item->node);
     }
@@ -501,6 +511,39 @@ static bool object_shows(walk *w, const umb_object *o, umb_waiting *item)
     return umb_detail_shows(&asker, o, &item->part, &item->settled);
 }
 
+/* Have moving objects wait, with their true bounds, as if they had come by themselves. */
+static void push_posed(walk *w, umb_posed *const *posed, uint32_t count)
+{
+    umb_node boxes;
+    boxes.count = count;
+    for (uint32_t slot = 0; slot < UMB_NODE_WIDTH; ++slot) {
+        const umb_posed *p = posed[slot < count ? slot : 0];
+        boxes.ref[slot] = slot < count ? UMB_REF_OBJECT | p->object : UMB_NONE;
+        for (int axis = 0; axis < 3; ++axis) {
+            boxes.min[axis][slot] = p->bounds.min[axis];
+            boxes.max[axis][slot] = p->bounds.max[axis];
+        }
+    }
+    uint8_t remember = 0;
+    opening o = {.boxes = &boxes, .number = UMB_NONE, .planes = w->frustum.all_planes, .remember = &remember};
+    open_boxes(w, &o);
+}
+
+/* The volume of a moving object is seen: where the object truly is, decides. Of one that nobody can tell, only the volume
+ * is known, and that it may be seen. */
+static void meet_mover(walk *w, const umb_waiting *item)
+{
+    umb_posed *p = umb_movers_meet(&w->culler->movers, item->ref & UMB_REF_NUMBER, false, &w->stats);
+    if (p != NULL && !p->known) {
+        report(w, item);
+        return;
+    }
+    w->stats.in_frustum -= w->once == NULL;
+    if (p != NULL) {
+        push_posed(w, &p, 1);
+    }
+}
+
 /* An object whose turn has come. It is reported only when everything that can hide it has been
  * drawn: until then it waits again, for the depth of its far end, and may yet turn out to be
  * hidden. One that hides by its own shape is asked about at once, too, because it is to be drawn
@@ -509,6 +552,15 @@ static bool object_shows(walk *w, const umb_object *o, umb_waiting *item)
 static bool visit_object(walk *w, umb_waiting *item, const umb_heap_entry *entry)
 {
     const umb_object *o = &w->scene->objects[item->ref & UMB_REF_NUMBER];
+    umb_object posed;
+    if (o->mover != UMB_NONE) {
+        if (item->node != UMB_NONE) {
+            meet_mover(w, item);
+            return false;
+        }
+        posed = umb_movers_object(&w->culler->movers, umb_movers_find(&w->culler->movers, o->mover));
+        o = &posed;
+    }
     if (umb_past_object_seen(&w->culler->past, item->ref & UMB_REF_NUMBER)) {
         draw(w, o->occluder, item);
         report(w, item);
@@ -601,11 +653,57 @@ static void draw_early(walk *w)
     w->stats.early = w->stats.occluders;
 }
 
+/* Moving objects whose volumes do not hold: eight that wait at a time. */
+typedef struct expired_movers {
+    walk *w;
+    umb_posed *waiting[UMB_NODE_WIDTH];
+    uint32_t count;
+} expired_movers;
+
+static void push_expired(expired_movers *e)
+{
+    if (e->count > 0) {
+        push_posed(e->w, e->waiting, e->count);
+        e->count = 0;
+    }
+}
+
+static void meet_expired(void *user, uint32_t mover)
+{
+    expired_movers *e = user;
+    walk *w = e->w;
+    uint32_t object = w->scene->motion.objects[mover];
+    umb_posed *p = umb_movers_meet(&w->culler->movers, object, true, &w->stats);
+    if (p == NULL) {
+        return;
+    }
+    if (!p->known) {
+        umb_waiting nowhere = {.nearest = -INFINITY, .ref = UMB_REF_OBJECT | object, .node = UMB_NONE, .planes = 1};
+        w->stats.in_frustum += 1;
+        report(w, &nowhere);
+        return;
+    }
+    e->waiting[e->count++] = p;
+    if (e->count == UMB_NODE_WIDTH) {
+        push_expired(e);
+    }
+}
+
+static void meet_all_expired(walk *w)
+{
+    expired_movers e = {.w = w};
+    umb_movers_expired(&w->culler->movers, meet_expired, &e);
+    push_expired(&e);
+}
+
 static void run(walk *w)
 {
     uint32_t roots = w->tree->flat ? w->tree->node_count : w->tree->node_count > 0;
     if (umb_past_has(&w->culler->past, UMB_COHERENCE_LIST)) {
         draw_early(w);
+    }
+    if (w->scene->motion.count > 0) {
+        meet_all_expired(w);
     }
     for (uint32_t i = 0; i < roots; ++i) {
         open_node(w, i, w->frustum.all_planes);
@@ -695,6 +793,23 @@ static void find_in_view(walk *w)
     c->count = v.count;
 }
 
+/* Without the walk of run(), which meets movers on its way: put them right afterwards. */
+static void settle_movers(walk *w)
+{
+    umb_culler *c = w->culler;
+    umb_in_view v = {.view = w->view,
+                     .kernels = c->kernels,
+                     .frustum = w->frustum,
+                     .objects = c->objects,
+                     .inside = c->inside,
+                     .entries = c->ops == NULL && c->def.unordered ? NULL : c->found,
+                     .projector = &w->projector,
+                     .count = c->count,
+                     .stats = &w->stats};
+    umb_movers_in_view(&c->movers, &v);
+    c->count = v.count;
+}
+
 static umb_viewer viewer_of(const umb_view *v)
 {
     bool parallel = v->projection == UMB_ORTHOGRAPHIC;
@@ -742,7 +857,8 @@ static umb_result find_chosen(walk *w)
 static void make_whole(walk *w)
 {
     umb_culler *c = w->culler;
-    umb_once_view v = {w->scene, &w->frustum, c->kernels, &w->projector};
+    umb_once_view v = {w->scene, &w->frustum, c->kernels, &w->projector,
+                       w->scene->motion.count > 0 ? &c->movers : NULL};
     bool sorted = c->ops != NULL || !c->def.unordered;
     for (uint32_t i = 0; i < c->count && c->ops != NULL; ++i) {
         c->objects[i] = umb_found_id(c->found[i]);
@@ -780,7 +896,8 @@ umb_result umb_cull(umb_culler *c, const umb_view *view, umb_visible_set *out)
         return umb_error_set(c->def.error, UMB_ERROR_STATE,
                              "the index found no memory at the last commit: commit again");
     }
-    bool ready = reserve(c, view, w.tree, w.scene);
+    w.scene = umb_movers_begin(&c->movers, &c->allocator, w.scene, view->time, c->ops != NULL);
+    bool ready = w.scene != NULL && reserve(c, view, w.tree, w.scene);
     if (ready) {
         prepare_walk(&w, c, view);
         ready = c->ops == NULL || (chooses(c) ? find_chosen(&w) : c->ops->prepare(c->method, &w.map, w.scene)) == UMB_OK;
@@ -802,17 +919,21 @@ umb_result umb_cull(umb_culler *c, const umb_view *view, umb_visible_set *out)
     if (w.once != NULL) {
         make_whole(&w);
     }
+    if (w.scene->motion.count > 0 && (c->ops == NULL || chooses(c))) {
+        settle_movers(&w);
+    }
     if (c->ops != NULL || !c->def.unordered) {
         write_answer(c);
     }
     w.stats.visible = c->count;
+    w.stats.hidden_movers = w.scene->motion.count - (w.scene->motion.count > 0 ? c->movers.met : 0);
     c->view = *view;
     c->version = w.scene->version;
     c->answered = true;
     out->objects = c->objects;
     out->inside = c->inside;
     out->count = c->count;
-    out->class_ = view->min_pixels > 0.0 ? UMB_CLASS_APPROXIMATE
+    out->class_ = view->min_pixels > 0.0 || w.scene->motion.fuzzy > 0 ? UMB_CLASS_APPROXIMATE
                   : c->ops != NULL       ? c->ops->class_
                                          : UMB_CLASS_STRICT;
     out->stats = w.stats;

@@ -39,17 +39,30 @@ void umb_once_free(umb_once *o, const umb_allocator *a)
     *o = (umb_once){0};
 }
 
-/* Eight whole boxes as a node. */
-static void gather(const umb_committed *scene, const uint32_t *ids, uint32_t count, umb_node *out)
+/* Where an object is, or its volume; *lost: nobody knows. */
+static const umb_aabb *whole_box(const umb_once_view *v, uint32_t id, bool *lost)
 {
+    const umb_object *o = &v->scene->objects[id];
+    const umb_posed *p = v->movers != NULL && o->mover != UMB_NONE ? umb_movers_find(v->movers, o->mover) : NULL;
+    *lost = p != NULL && !p->known;
+    return p != NULL && p->known ? &p->bounds : &o->bounds;
+}
+
+/* Eight whole boxes as a node. Returns a bit for each one that is no object's, but in view wherever it is. */
+static uint32_t gather(const umb_once_view *v, const uint32_t *ids, uint32_t count, umb_node *out)
+{
+    uint32_t lost = 0;
     out->count = count;
     for (uint32_t slot = 0; slot < UMB_NODE_WIDTH; ++slot) {
-        const umb_aabb *box = &scene->objects[ids[slot < count ? slot : 0]].bounds;
+        bool is_lost;
+        const umb_aabb *box = whole_box(v, ids[slot < count ? slot : 0], &is_lost);
+        lost |= is_lost ? 1u << slot : 0;
         for (int i = 0; i < 3; ++i) {
             out->min[i][slot] = box->min[i];
             out->max[i][slot] = box->max[i];
         }
     }
+    return lost;
 }
 
 uint32_t umb_once_finish(const umb_once_view *v, const uint32_t *ids, uint32_t count, uint64_t *entries,
@@ -62,9 +75,9 @@ uint32_t umb_once_finish(const umb_once_view *v, const uint32_t *ids, uint32_t c
         umb_projected projected;
         uint16_t left[UMB_NODE_WIDTH];
         memcpy(batch, ids + i, n * sizeof batch[0]);
-        gather(v->scene, batch, n, &node);
-        uint32_t in = ~umb_frustum_test_node(v->frustum, v->kernels, &node, v->frustum->all_planes, NULL, left) &
-                      ((1u << n) - 1u);
+        uint32_t in = gather(v, batch, n, &node);
+        in |= ~umb_frustum_test_node(v->frustum, v->kernels, &node, v->frustum->all_planes, NULL, left);
+        in &= (1u << n) - 1u;
         if (entries != NULL) {
             v->kernels->project(&node, v->projector, &projected);
         }

@@ -6,6 +6,7 @@
 #include "base/memory.h"
 #include "frustum/box_kernels.h"
 #include "index/tree.h"
+#include "movers.h"
 #include "umbrage/cull.h"
 
 /* What has become of an item in this frame, as bits. */
@@ -46,6 +47,7 @@ typedef struct umb_once_view {
     const umb_frustum *frustum;
     const umb_box_kernels *kernels;
     const umb_projector *projector;
+    const umb_movers *movers; /* NULL: nothing moves. Else what is known of movers counts in place of their volumes */
 } umb_once_view;
 
 /* Look at count found objects again, by their whole boxes: those that are outside the frustum are dropped (they were met

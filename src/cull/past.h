@@ -124,6 +124,12 @@ typedef enum umb_past_verdict {
 umb_past_verdict umb_past_judge(umb_past *p, uint32_t occluder, const umb_pixel_rect *rect);
 /* It was drawn, and changed so many tiles. costly: it may rest when it changes nothing. */
 void umb_past_drew(umb_past *p, uint32_t occluder, const umb_pixel_rect *rect, uint32_t tiles, bool costly);
+/* The last one drawn moves by itself: where it will be in the next frame is not known before the walk. */
+static inline void umb_past_unlist(umb_past *p, uint32_t occluder)
+{
+    p->next_count -= p->next_count > 0 && p->next[p->next_count - 1] == occluder;
+}
+
 /* The last one judged to be drawn turned out to face away, or the like: it cost the budget nothing. */
 void umb_past_refund(umb_past *p);
 

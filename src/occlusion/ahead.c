@@ -74,7 +74,7 @@ static void guess(umb_ahead *a)
     a->image_count = 0;
     for (uint32_t i = 0; i < a->noted_count; ++i) {
         uint32_t occluder = a->noted[i];
-        if (occluder < a->scene->occluder_count && find(a, occluder) == NULL) {
+        if (occluder < a->scene->occluder_count && !a->scene->occluders[occluder].moves && find(a, occluder) == NULL) {
             a->place[occluder] = a->image_count;
             umb_ahead_image *image = &a->images[a->image_count++];
             image->occluder = occluder;
@@ -197,7 +197,7 @@ const umb_ahead_image *umb_ahead_take(umb_ahead *a, uint32_t occluder)
 
 void umb_ahead_note(umb_ahead *a, uint32_t occluder, uint32_t edge_count)
 {
-    if (!a->on) {
+    if (!a->on || a->scene->occluders[occluder].moves) {
         return;
     }
     uint32_t work = a->scene->occluders[occluder].mesh->block_position_count + EDGE_WORK * edge_count;

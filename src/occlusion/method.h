@@ -12,7 +12,8 @@
  *
  * Methods that choose their occluders first (depth-first, cull/chosen.c):
  *
- *   choose         the viewer, the committed scene and the index: choose the occluders of the frame
+ *   choose         the viewer, the committed scene and the index: choose the occluders of the frame, none that moves by
+ *                  itself (umb_occluder.moves): nobody knows yet where those are
  *   ask            about a node's boxes, with the token that the answer about the node gave; answers hand
  *                  a token to each child: what is left to ask below it
  *   hides_object   about one object in more detail than its box

@@ -1,12 +1,10 @@
 #include "scene.h"
 
-#include <float.h>
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 
-#include "geometry/transform.h"
 #include "scene_state.h"
 
 #define MAX_ITEMS (1u << 30) /* an index keeps two bits of an item's number for itself */
@@ -65,6 +63,7 @@ umb_result umb_scene_create(const umb_scene_def *def, umb_scene **out)
     }
     scene->allocator = allocator;
     scene->error = def->error;
+    atomic_flag_clear(&scene->moving.witness_lock);
     memcpy(scene->origin, def->origin, sizeof scene->origin);
     *out = scene;
     return UMB_OK;
@@ -83,6 +82,7 @@ void umb_scene_destroy(umb_scene *scene)
         umb_weld_group_free(&a, scene->groups[i]);
     }
     umb_weld_free_retired(scene);
+    umb_motion_free(scene);
     umb_ids_free(&scene->object_ids, &a);
     umb_ids_free(&scene->occluder_ids, &a);
     umb_memory_free(&a, scene->shapes, scene->shape_capacity * sizeof *scene->shapes);
@@ -137,104 +137,33 @@ umb_result umb_scene_add_shape(umb_scene *scene, const umb_shape_def *def, umb_s
     }
 }
 
-/* Finite and not inverted; false for NaN. */
-static bool box_is_possible(const umb_aabb *b)
-{
-    bool possible = true;
-    for (int i = 0; i < 3; ++i) {
-        possible &= (b->min[i] >= -FLT_MAX) & (b->max[i] <= FLT_MAX) & (b->min[i] <= b->max[i]);
-    }
-    return possible;
-}
-
-static bool box_is_zero(const umb_aabb *b)
-{
-    for (int i = 0; i < 3; ++i) {
-        if (b->min[i] != 0.0f || b->max[i] != 0.0f) {
-            return false;
-        }
-    }
-    return true;
-}
-
-/* By the bits: without a branch, and four at once where the compiler can. */
-static bool transform_is_finite(const umb_transform *t)
-{
-    uint32_t bits[12], bad = 0;
-    memcpy(bits, t->m, sizeof bits);
-    for (int i = 0; i < 12; ++i) {
-        bad |= (bits[i] & 0x7F800000u) == 0x7F800000u;
-    }
-    return bad == 0;
-}
-
-/* What a transform makes of a shape. */
-typedef struct outcome {
-    umb_mesh_place place;
-    const umb_aabb *bounds;       /* of what can be seen; NULL without a shape */
-    const umb_aabb *block_bounds; /* of what blocks; zero when nothing does */
-    bool identity, mirrored;
-} outcome;
-
 /* See where a transform puts a shape, if the place is possible. Changes nothing else: a refused call
  * leaves the scene as it was. */
 static umb_result look(const umb_scene *scene, umb_shape shape, const umb_transform *transform,
-                       outcome *out)
+                       umb_outcome *out)
 {
-    static const umb_aabb nothing = {{0, 0, 0}, {0, 0, 0}};
     if (shape > scene->shape_count) {
         return umb_scene_fail(scene, UMB_ERROR_ARGUMENT, "no shape has number %u", shape);
     }
-    const umb_mesh *mesh = umb_scene_mesh(scene, shape);
-    out->identity = transform == NULL || umb_transform_is_identity(transform);
-    out->mirrored = false;
-    out->bounds = mesh != NULL ? &mesh->bounds : NULL;
-    out->block_bounds = mesh != NULL ? &mesh->block_bounds : &nothing;
-    if (out->identity) {
-        return UMB_OK;
-    }
-    if (!transform_is_finite(transform)) {
-        return umb_scene_fail(scene, UMB_ERROR_ARGUMENT, "a transform is not finite");
-    }
-    if (mesh != NULL) {
-        out->bounds = &out->place.bounds;
-        out->block_bounds = umb_mesh_world_bounds(mesh, transform, &out->place);
-        if (!box_is_possible(out->block_bounds)) {
-            return umb_scene_fail(scene, UMB_ERROR_ARGUMENT,
-                                  "a transform moves vertices out of range");
-        }
-    }
-    out->mirrored = umb_transform_mirrors(transform);
-    return UMB_OK;
+    const char *wrong = umb_outcome_find(umb_scene_mesh(scene, shape), transform, out);
+    return wrong == NULL ? UMB_OK : umb_scene_fail(scene, UMB_ERROR_ARGUMENT, "%s", wrong);
 }
 
 /* Put it there. */
-static void place(umb_placement *p, const umb_transform *transform, const outcome *seen)
+void umb_scene_place(umb_placement *p, const umb_transform *transform, const umb_outcome *seen)
 {
-    static const umb_transform identity = {{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
-    p->transform = seen->identity ? identity : *transform;
+    p->transform = *umb_outcome_transform(seen, transform);
     p->block_bounds = *seen->block_bounds;
     p->identity = seen->identity;
     p->mirrored = seen->mirrored;
 }
 
 /* The bounds of an object: those given, or the shape's own. */
-static umb_result choose_bounds(const umb_scene *scene, const outcome *seen, const umb_aabb *given,
+static umb_result choose_bounds(const umb_scene *scene, const umb_outcome *seen, const umb_aabb *given,
                                 const umb_aabb **out)
 {
-    bool use_own = seen->bounds != NULL && (given == NULL || box_is_zero(given));
-    *out = use_own ? seen->bounds : given;
-    if (use_own && seen->bounds == seen->block_bounds) {
-        return UMB_OK; /* look() has found them possible */
-    }
-    if (*out == NULL) {
-        return umb_scene_fail(scene, UMB_ERROR_ARGUMENT, "an object without a shape needs bounds");
-    }
-    if (!box_is_possible(*out)) {
-        return umb_scene_fail(scene, UMB_ERROR_ARGUMENT,
-                              "an object's bounds are not finite or inverted");
-    }
-    return UMB_OK;
+    const char *wrong = umb_outcome_bounds(seen, given, out);
+    return wrong == NULL ? UMB_OK : umb_scene_fail(scene, UMB_ERROR_ARGUMENT, "%s", wrong);
 }
 
 umb_result umb_scene_add_object(umb_scene *scene, const umb_object_def *def, uint32_t *out)
@@ -243,8 +172,8 @@ umb_result umb_scene_add_object(umb_scene *scene, const umb_object_def *def, uin
         return umb_scene_fail(scene, UMB_ERROR_ARGUMENT, "an object's definition breaks the rules");
     }
     *out = UMB_NONE;
-    umb_object_slot slot = {.flags = def->flags, .weld = UMB_NONE, .state = UMB_SLOT_USED};
-    outcome seen;
+    umb_object_slot slot = {.flags = def->flags, .weld = UMB_NONE, .mover = UMB_NONE, .state = UMB_SLOT_USED};
+    umb_outcome seen;
     const umb_aabb *bounds = NULL;
     umb_result result = look(scene, def->shape, &def->transform, &seen);
     if (result == UMB_OK) {
@@ -255,7 +184,7 @@ umb_result umb_scene_add_object(umb_scene *scene, const umb_object_def *def, uin
     }
     slot.placement.shape = def->shape;
     slot.bounds = *bounds;
-    place(&slot.placement, &def->transform, &seen);
+    umb_scene_place(&slot.placement, &def->transform, &seen);
     uint32_t id = umb_ids_peek(&scene->object_ids);
     if (id >= MAX_ITEMS) {
         return umb_scene_fail(scene, UMB_ERROR_LIMIT, "more than 2^30 objects");
@@ -313,7 +242,10 @@ umb_result umb_scene_move_object(umb_scene *scene, uint32_t object, const umb_tr
     if (slot == NULL) {
         return fail_object(scene, object);
     }
-    outcome seen;
+    if (slot->mover != UMB_NONE) {
+        return umb_scene_fail(scene, UMB_ERROR_STATE, "object %u moves by itself: end its motion first", object);
+    }
+    umb_outcome seen;
     const umb_aabb *box = NULL;
     umb_result result = look(scene, slot->placement.shape, transform, &seen);
     if (result == UMB_OK) {
@@ -323,7 +255,7 @@ umb_result umb_scene_move_object(umb_scene *scene, uint32_t object, const umb_tr
         return result;
     }
     umb_weld_dissolve(scene, slot->weld);
-    place(&slot->placement, transform, &seen);
+    umb_scene_place(&slot->placement, transform, &seen);
     slot->bounds = *box;
     umb_scene_touch_object(scene, object);
     return UMB_OK;
@@ -352,6 +284,7 @@ umb_result umb_scene_remove_object(umb_scene *scene, uint32_t object)
         return fail_object(scene, object);
     }
     umb_weld_dissolve(scene, slot->weld);
+    umb_motion_remove(scene, slot);
     slot->state = UMB_SLOT_REMOVED;
     umb_ids_release(&scene->object_ids, object);
     umb_scene_touch_object(scene, object);
@@ -367,12 +300,12 @@ umb_result umb_scene_add_occluder(umb_scene *scene, umb_shape shape, const umb_t
     }
     *out = UMB_NONE;
     umb_occluder_slot slot = {.placement.shape = shape, .number = UMB_NONE, .state = UMB_SLOT_USED};
-    outcome seen;
+    umb_outcome seen;
     umb_result result = look(scene, shape, transform, &seen);
     if (result != UMB_OK) {
         return result;
     }
-    place(&slot.placement, transform, &seen);
+    umb_scene_place(&slot.placement, transform, &seen);
     const umb_mesh *mesh = umb_scene_mesh(scene, shape);
     if (mesh == NULL || mesh->triangle_count == 0) {
         return umb_scene_fail(scene, UMB_ERROR_ARGUMENT,
@@ -427,6 +360,7 @@ size_t umb_scene_memory(const umb_scene *scene)
 {
     size_t bytes = sizeof *scene + umb_ids_memory(&scene->object_ids) +
                    umb_ids_memory(&scene->occluder_ids);
+    bytes += umb_motion_memory(scene);
     bytes += scene->shape_capacity * sizeof *scene->shapes;
     bytes += scene->object_capacity * sizeof *scene->objects;
     bytes += scene->occluder_capacity * sizeof *scene->occluders;

@@ -2,7 +2,7 @@
 #ifndef UMB_SCENE_H
 #define UMB_SCENE_H
 
-#include "mesh.h"
+#include "motion.h"
 
 /* Something that hides. World vertices are umb_transform_point(transform, position), or the
  * positions themselves when identity is set. */
@@ -13,6 +13,8 @@ typedef struct umb_occluder {
     uint32_t owner;       /* the object it belongs to; UMB_NONE for welded and hand-made ones */
     bool identity;
     bool mirrored;        /* the transform turns fronts into backs: compensate */
+    bool moves;           /* its owner moves by itself: where it is comes out while the walk runs, so nobody
+                             else may look at it */
 } umb_occluder;
 
 /* An object as committed. */
@@ -21,6 +23,8 @@ typedef struct umb_object {
     const umb_mesh *mesh; /* NULL without a shape. Its parts refine the bounds */
     umb_transform transform;
     uint32_t occluder;    /* index of the occluder it owns, or UMB_NONE */
+    uint32_t mover;       /* its number among those that move by themselves, or UMB_NONE. If it has one, bounds
+                             are a volume that holds it for a time, and transform is out of date */
     bool used;            /* the id is in use */
     bool live;            /* in use and not UMB_OBJECT_IGNORED */
     bool identity;
@@ -41,7 +45,19 @@ typedef struct umb_committed {
     const uint32_t *came, *went;   /* objects that are live now and were not; that were and are no more */
     const uint32_t *replaced;      /* occluder numbers, used before or now, that hold another occluder or none */
     uint32_t came_count, went_count, replaced_count;
+    umb_motion motion;
 } umb_committed;
+
+/* Cullers register to be asked at each commit what they were told of moving objects: *count of it, which is theirs, and
+ * forgotten when forget is set. Registering is safe from several threads at once, but not during a commit. */
+typedef struct umb_scene_witness {
+    const umb_posed *(*told)(void *user, bool forget, uint32_t *count);
+    void *user;
+    struct umb_scene_witness *next;
+} umb_scene_witness;
+
+void umb_scene_add_witness(umb_scene *scene, umb_scene_witness *witness);
+void umb_scene_remove_witness(umb_scene *scene, umb_scene_witness *witness);
 
 const umb_committed *umb_scene_committed(const umb_scene *scene);
 

@@ -16,6 +16,7 @@ static umb_occluder make_occluder(const umb_scene *scene, const umb_placement *p
                       .owner = owner,
                       .identity = p->identity,
                       .mirrored = p->mirrored};
+    o.moves = owner != UMB_NONE && scene->objects[owner].mover != UMB_NONE;
     return o;
 }
 
@@ -31,12 +32,13 @@ static umb_occluder make_welded(const umb_mesh *mesh)
 
 static umb_object make_object(const umb_scene *scene, const umb_object_slot *slot, uint32_t occluder)
 {
-    umb_object o = {.occluder = occluder};
+    umb_object o = {.occluder = occluder, .mover = UMB_NONE};
     if (slot->state == UMB_SLOT_USED) {
         o.bounds = slot->bounds;
         o.mesh = umb_scene_mesh(scene, slot->placement.shape);
         o.transform = slot->placement.transform;
         o.used = true;
+        o.mover = slot->mover;
         o.live = (slot->flags & UMB_OBJECT_IGNORED) == 0;
         o.identity = slot->placement.identity;
         o.refine = o.mesh != NULL && (slot->flags & UMB_OBJECT_IS_SHAPE) != 0;
@@ -228,12 +230,14 @@ static void commit_moved(umb_scene *scene)
         object->bounds = slot->bounds;
         object->transform = p->transform;
         object->identity = p->identity;
+        object->mover = slot->mover;
         if (object->occluder != UMB_NONE) {
             umb_occluder *occluder = &scene->committed_occluders[object->occluder];
             occluder->transform = p->transform;
             occluder->bounds = p->block_bounds;
             occluder->identity = p->identity;
             occluder->mirrored = p->mirrored;
+            occluder->moves = slot->mover != UMB_NONE;
         }
         scene->committed_moved[count] = scene->touched[i];
         count += object->live ? 1u : 0u;
@@ -244,6 +248,7 @@ static void commit_moved(umb_scene *scene)
 
 umb_result umb_scene_commit(umb_scene *scene)
 {
+    umb_motion_commit(scene);
     bool changed = scene->structure_changed || scene->touched_count > 0;
     if (scene->structure_changed) {
         umb_result result = commit_structure(scene);
@@ -253,6 +258,7 @@ umb_result umb_scene_commit(umb_scene *scene)
     } else if (changed) {
         commit_moved(scene);
     }
+    umb_motion_committed(scene);
     scene->touched_count = 0;
     scene->structure_changed = false;
     scene->committed.version += changed ? 1 : 0;

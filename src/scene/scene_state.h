@@ -3,7 +3,11 @@
 #ifndef UMB_SCENE_STATE_H
 #define UMB_SCENE_STATE_H
 
+#include <stdatomic.h>
+
+#include "expiries.h"
 #include "ids.h"
+#include "placement.h"
 #include "scene.h"
 
 enum { UMB_SLOT_FREE = 0, UMB_SLOT_USED = 1, UMB_SLOT_REMOVED = 2 };
@@ -21,6 +25,7 @@ typedef struct umb_object_slot {
     umb_aabb bounds;
     uint32_t flags;
     uint32_t weld; /* group it is welded into, or UMB_NONE */
+    uint32_t mover; /* its number in movers, or UMB_NONE */
     uint8_t state;
     bool touched; /* is in the list of touched objects */
 } umb_object_slot;
@@ -49,6 +54,43 @@ typedef struct umb_occluder_source {
     uint32_t index;        /* of the group's mesh, or the hand-made occluder */
     bool replaced;         /* its number is in the list */
 } umb_occluder_source;
+
+/* What is known of an object that moves by itself. */
+typedef struct umb_mover_slot {
+    umb_motion_def def;
+    umb_pose known;  /* where it was last known to be, */
+    double known_at; /* and when; its volume grows from there */
+    double period;   /* that its volume was made to hold for */
+    uint8_t why;     /* UMB_DUE_*: it is in the list of those that are due, for these reasons; 0: it is not */
+    bool placed;     /* known is known */
+    bool seen;       /* its volume was seen since it was made */
+    uint64_t shown;  /* the last commit that heard of its being reported */
+} umb_mover_slot;
+
+enum {
+    UMB_DUE_FRESH = 1u << 0,    /* its motion is new */
+    UMB_DUE_EXPIRED = 1u << 1,  /* its volume no longer holds */
+    UMB_DUE_REVEALED = 1u << 2, /* its volume was seen and it was not */
+    UMB_DUE_STOP = 1u << 3      /* it is to stand still, or was removed */
+};
+
+/* The movers of a scene; motion.c. */
+typedef struct umb_movers_state {
+    umb_pose_source source;
+    umb_ids ids;
+    umb_mover_slot *slots;
+    uint32_t *objects;  /* of each; UMB_NONE where the number is not in use */
+    uint32_t *due;      /* whose volumes are to be made anew, each once; room for all */
+    umb_expiries expiries;
+    size_t slot_capacity, object_capacity, due_capacity;
+    uint32_t due_count, count, fuzzy;
+    double time;        /* from the next commit on */
+    double made_at;     /* the time at the last commit, though it failed */
+    uint64_t commit;    /* its number */
+    umb_motion_stats stats;
+    umb_scene_witness *witnesses;
+    atomic_flag witness_lock;
+} umb_movers_state;
 
 struct umb_scene {
     umb_allocator allocator;
@@ -87,6 +129,7 @@ struct umb_scene {
     size_t committed_object_capacity, committed_occluder_capacity, source_capacity;
     size_t committed_moved_capacity, committed_came_capacity, committed_went_capacity, committed_replaced_capacity;
     umb_scene_listener *listeners;
+    umb_movers_state moving;
 };
 
 /* The mesh of a shape, NULL for 0. */
@@ -103,6 +146,18 @@ void umb_scene_touch_object(umb_scene *scene, uint32_t object);
 void umb_occluders_add_owned(umb_scene *scene, const umb_occluder *occluder);
 void umb_occluders_add_free(umb_scene *scene, const umb_occluder *occluder, umb_weld_group *group, uint32_t index);
 void umb_occluders_remove(umb_scene *scene, uint32_t number);
+
+/* Put a shape where it has been found to be. */
+void umb_scene_place(umb_placement *p, const umb_transform *transform, const umb_outcome *seen);
+
+/* motion.c. The first steps of a commit for what moves by itself: moves objects, as umb_scene_move_object() does, to
+ * volumes made anew, and cannot fail. Until umb_motion_committed() has been called, volumes are not to be trusted. */
+void umb_motion_commit(umb_scene *scene);
+void umb_motion_committed(umb_scene *scene);
+/* The object of a slot is removed. */
+void umb_motion_remove(umb_scene *scene, const umb_object_slot *slot);
+void umb_motion_free(umb_scene *scene);
+size_t umb_motion_memory(const umb_scene *scene);
 
 /* Let the members of a group hide by their own shapes again. */
 void umb_weld_dissolve(umb_scene *scene, uint32_t group);

@@ -38,7 +38,7 @@ static uint32_t count_own(const umb_scene *scene)
     uint32_t count = 0;
     for (uint32_t i = 0; i < scene->object_ids.used; ++i) {
         const umb_object_slot *slot = &scene->objects[i];
-        if (slot->weld == UMB_NONE && (slot->flags & UMB_OBJECT_STATIC) != 0 &&
+        if (slot->weld == UMB_NONE && (slot->flags & UMB_OBJECT_STATIC) != 0 && slot->mover == UMB_NONE &&
             umb_scene_object_hides(scene, slot)) {
             count += umb_scene_mesh(scene, slot->placement.shape)->triangle_count;
         }

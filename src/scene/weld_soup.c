@@ -91,7 +91,7 @@ static void add_triangles(umb_weld_soup *soup, const umb_scene *scene, uint32_t 
 static bool is_member(const umb_scene *scene, uint32_t object)
 {
     const umb_object_slot *slot = &scene->objects[object];
-    return (slot->flags & UMB_OBJECT_STATIC) != 0 && umb_scene_object_hides(scene, slot);
+    return (slot->flags & UMB_OBJECT_STATIC) != 0 && slot->mover == UMB_NONE && umb_scene_object_hides(scene, slot);
 }
 
 static umb_result collect(umb_weld_soup *soup, umb_scene *scene, umb_scratch *scratch)
