@@ -18,15 +18,29 @@ typedef enum umb_index_kind {
                             runs of rows, which help as far as neighbours in the list are near */
     /* Space is cut by planes across an axis; what a plane cuts is in both halves, each with the box of its part. An
        object then is in several cells, is answered once, and is visible if any part of it may be seen (Gummerus 3.5) */
-    UMB_INDEX_KDTREE = 2
+    UMB_INDEX_KDTREE = 2,
+    /* A cube is cut in eight, each of these in eight, ...; a quadtree is cut across the two axes along which the scene
+       spreads most (Gummerus 3.4) */
+    UMB_INDEX_OCTREE = 3,
+    UMB_INDEX_QUADTREE = 4,
+    /* Cells of one size, an object in each that it reaches into, found through blocks of them (Gummerus 3.3) */
+    UMB_INDEX_GRID = 5
 } umb_index_kind;
 
 /* How a kind decides where to split. */
 typedef enum umb_index_rule {
-    UMB_RULE_DEFAULT = 0, /* BVH, KDTREE: by surface area */
+    /* BVH, KDTREE: by surface area. OCTREE, QUADTREE: in the middle; what planes cut is in several cells */
+    UMB_RULE_DEFAULT = 0,
     /* KDTREE: axes in turn (Bentley); of the faces of boxes that leave at least three eighths on each side, the plane
        that cuts the fewest */
-    UMB_RULE_MEDIAN = 1
+    UMB_RULE_MEDIAN = 1,
+    /* OCTREE, QUADTREE: planes through the mean of what is in a cell, weighted by the inverse of its size; those that
+       cut too much are left out; what the others cut stays with the cell, whole (Shagam and Pfeiffer 2003) */
+    UMB_RULE_IRREGULAR = 2,
+    /* OCTREE, QUADTREE: each object in one cell, that of its middle, of its own size or larger */
+    UMB_RULE_LOOSE = 3,
+    /* GRID: crowded cells have a grid of their own */
+    UMB_RULE_NESTED = 4
 } umb_index_rule;
 
 typedef struct umb_index_def {

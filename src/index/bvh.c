@@ -65,6 +65,7 @@ typedef struct emitter {
     const umb_bvh_item *items;
     const umb_bvh_split *splits;
     const umb_cell_cut *cuts; /* NULL: no orders */
+    const umb_cell_point *points;
     umb_node *nodes;
     umb_order *orders;
     uint32_t next;
@@ -74,9 +75,20 @@ typedef struct emitter {
 typedef struct opened {
     uint32_t slots[UMB_NODE_WIDTH];
     uint32_t count, split_count;
+    uint8_t octant; /* that is being gathered */
     const umb_cell_cut *cuts;
     umb_order *order; /* NULL: not wanted */
 } opened;
+
+/* Halves of an octree node: where an octant begins, it is noted down. */
+static void enter_octant(opened *o, uint32_t half)
+{
+    bool item = (half & UMB_BVH_ITEM) != 0;
+    const umb_cell_cut *cut = &o->cuts[half & ~UMB_BVH_ITEM];
+    if (item || cut->group != UMB_CELL_INNER) {
+        o->octant = cut->octant[item];
+    }
+}
 
 static uint8_t gather(opened *o, const umb_bvh_split *splits, uint32_t node, int j);
 
@@ -88,6 +100,13 @@ static uint8_t gather_halves(opened *o, const umb_bvh_split *splits, uint32_t no
     umb_order *order = o->order;
     if (order == NULL || o->cuts[node].axis == UMB_CELL_NO_PLANE) {
         gather(o, splits, s->left, left);
+        gather(o, splits, s->right, right);
+        return UMB_ORDER_END;
+    }
+    if (o->cuts[node].group != UMB_CELL_ALONE) {
+        enter_octant(o, s->left);
+        gather(o, splits, s->left, left);
+        enter_octant(o, s->right);
         gather(o, splits, s->right, right);
         return UMB_ORDER_END;
     }
@@ -117,6 +136,9 @@ static uint8_t gather(opened *o, const umb_bvh_split *splits, uint32_t node, int
         if (j > 1) {
             return gather_halves(o, splits, node, s->pick[j - 1], j - s->pick[j - 1]);
         }
+    }
+    if (o->order != NULL && o->order->kind == UMB_ORDER_OCTANTS) {
+        o->order->octant[o->count] = o->octant;
     }
     o->slots[o->count++] = node;
     return UMB_ORDER_END;
@@ -154,6 +176,11 @@ static void emit(emitter *e, uint32_t split, uint32_t number, uint32_t parent)
     umb_node *node = &e->nodes[number];
     memset(node, 0, sizeof(*node));
     node->parent = parent;
+    if (o.order != NULL && (split & UMB_BVH_ITEM) == 0 && o.cuts[split].group == UMB_CELL_TOP) {
+        o.order->kind = UMB_ORDER_OCTANTS;
+        o.order->axes = (uint8_t)e->points[split].axes;
+        memcpy(o.order->at, e->points[split].at, sizeof(e->points[split].at));
+    }
     open_node(&o, e->splits, split);
     node->count = o.count;
     for (uint32_t i = 0; i < node->count; ++i) {
@@ -195,7 +222,7 @@ size_t umb_built_memory(const umb_built *built)
 }
 
 umb_result umb_bvh_lay_out(const umb_allocator *a, const umb_bvh_item *items, const umb_bvh_split *splits,
-                           uint32_t root, const umb_cell_cut *cuts, umb_built *out)
+                           uint32_t root, const umb_cell_cut *cuts, const umb_cell_point *points, umb_built *out)
 {
     *out = (umb_built){0};
     out->node_count = count_nodes(splits, root, &out->slot_count);
@@ -207,7 +234,7 @@ umb_result umb_bvh_lay_out(const umb_allocator *a, const umb_bvh_item *items, co
         umb_built_free(out, a);
         return UMB_ERROR_MEMORY;
     }
-    emitter e = {items, splits, cuts, out->nodes, out->orders, 1};
+    emitter e = {items, splits, cuts, points, out->nodes, out->orders, 1};
     emit(&e, root, 0, UMB_NONE);
     return UMB_OK;
 }
@@ -224,7 +251,7 @@ umb_result umb_bvh_build(const umb_allocator *a, const umb_tasks *tasks, umb_bvh
     uint32_t root;
     umb_result result = umb_bvh_split_items(a, tasks, items, count, splits, &root);
     if (result == UMB_OK) {
-        result = umb_bvh_lay_out(a, items, splits, root, NULL, out);
+        result = umb_bvh_lay_out(a, items, splits, root, NULL, NULL, out);
     }
     umb_memory_free(a, splits, bytes);
     return result;

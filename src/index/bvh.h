@@ -89,10 +89,12 @@ umb_result umb_bvh_split_items(const umb_allocator *a, const umb_tasks *tasks, u
 uint32_t umb_bvh_split_run(umb_bvh_item *items, uint32_t first, uint32_t end, umb_bvh_split *splits);
 
 struct umb_cell_cut;
+struct umb_cell_point;
 
-/* Lay out a binary tree in the wide nodes that its picks say. cuts: of each split (cells.h); then orders are made, too,
- * else they are NULL. */
+/* Lay out a binary tree in the wide nodes that its picks say. cuts, points: of each split (cells.h); then orders are made,
+ * too. Both may be NULL. */
 umb_result umb_bvh_lay_out(const umb_allocator *a, const umb_bvh_item *items, const umb_bvh_split *splits,
-                           uint32_t root, const struct umb_cell_cut *cuts, umb_built *out);
+                           uint32_t root, const struct umb_cell_cut *cuts, const struct umb_cell_point *points,
+                           umb_built *out);
 
 #endif

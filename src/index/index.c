@@ -4,8 +4,10 @@
 
 #include "bvh.h"
 #include "cut.h"
+#include "grid.h"
 #include "index_name.h"
 #include "kdtree.h"
+#include "octree.h"
 #include "parts.h"
 
 struct umb_index {
@@ -97,6 +99,12 @@ static umb_result build(const umb_index *index, umb_bvh_item *items, uint32_t co
         return build_flat(a, items, count, out);
     case UMB_INDEX_KDTREE:
         return umb_kdtree_build(a, index->def.rule, items, count, out);
+    case UMB_INDEX_OCTREE:
+        return umb_octree_build(a, index->def.rule, 7, items, count, out);
+    case UMB_INDEX_QUADTREE:
+        return umb_octree_build(a, index->def.rule, umb_octree_flat_axes(items, count), items, count, out);
+    case UMB_INDEX_GRID:
+        return umb_grid_build(a, index->def.rule, items, count, out);
     default:
         return umb_bvh_build(a, &index->def.tasks, items, count, out);
     }

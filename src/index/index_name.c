@@ -14,6 +14,14 @@ static const variant variants[] = {
     {"flat", UMB_INDEX_FLAT, UMB_RULE_DEFAULT},
     {"kdtree", UMB_INDEX_KDTREE, UMB_RULE_DEFAULT},
     {"kdtree,median", UMB_INDEX_KDTREE, UMB_RULE_MEDIAN},
+    {"octree", UMB_INDEX_OCTREE, UMB_RULE_DEFAULT},
+    {"octree,irregular", UMB_INDEX_OCTREE, UMB_RULE_IRREGULAR},
+    {"octree,loose", UMB_INDEX_OCTREE, UMB_RULE_LOOSE},
+    {"quadtree", UMB_INDEX_QUADTREE, UMB_RULE_DEFAULT},
+    {"quadtree,irregular", UMB_INDEX_QUADTREE, UMB_RULE_IRREGULAR},
+    {"quadtree,loose", UMB_INDEX_QUADTREE, UMB_RULE_LOOSE},
+    {"grid", UMB_INDEX_GRID, UMB_RULE_DEFAULT},
+    {"grid,nested", UMB_INDEX_GRID, UMB_RULE_NESTED},
 };
 
 #define VARIANTS (sizeof(variants) / sizeof(variants[0]))

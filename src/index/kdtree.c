@@ -1,12 +1,5 @@
 /* kd-trees. A box that a plane cuts becomes two parts, one in each half; a plane goes through a face of some box, where
  * it cuts fewer than beside it.
- *
- * The parts of the cells that are still to be cut are kept on one stack:
- *
- *     first                                    top
- *     | below only | cut | above only | ... | cut, above only |    the upper half is copied to the top, the lower
- *     | lower half       |            | ... | upper half      |    one stays; when it is done, the upper one comes
- *     | upper half                    | ...                        down: no part is there more than twice
  */
 #include "kdtree.h"
 
@@ -30,16 +23,14 @@
 typedef struct kd {
     umb_cells cells;
     umb_index_rule rule;
-    umb_bvh_item *stack;
-    size_t top, capacity;
     uint64_t *faces, *scratch; /* of one cell's parts, twice the count of items each */
     size_t face_capacity, scratch_capacity;
     uint32_t most_depth;
 } kd;
 
 typedef struct cell {
-    size_t first; /* on the stack */
-    uint32_t count, depth;
+    umb_cell_run run;
+    uint32_t depth;
     uint64_t extra; /* slots that cuts may still cost */
 } cell;
 
@@ -81,7 +72,7 @@ typedef struct sweep {
 
 static uint32_t cut_count(const cell *c, division d)
 {
-    return d.below + d.above - c->count;
+    return d.below + d.above - c->run.count;
 }
 
 static double size_of(const sweep *s, const umb_aabb *box)
@@ -104,14 +95,14 @@ static double area_cost(const sweep *s, float at, division d)
 static double median_cost(const sweep *s, division d)
 {
     uint32_t cuts = cut_count(s->c, d);
-    double off = fabs((double)d.below - d.above) / s->c->count;
-    return off > 0.25 || 2 * cuts > s->c->count ? INFINITY : cuts + 0.5 * off;
+    double off = fabs((double)d.below - d.above) / s->c->run.count;
+    return off > 0.25 || 2 * cuts > s->c->run.count ? INFINITY : cuts + 0.5 * off;
 }
 
 static void consider(const sweep *s, float at, division d, plane *best)
 {
     if (d.below == 0 || d.above == 0 || cut_count(s->c, d) > s->c->extra ||
-        (d.below == s->c->count && d.above == s->c->count)) {
+        (d.below == s->c->run.count && d.above == s->c->run.count)) {
         return;
     }
     double cost = s->k->rule == UMB_RULE_MEDIAN ? median_cost(s, d) : area_cost(s, at, d);
@@ -123,11 +114,11 @@ static void consider(const sweep *s, float at, division d, plane *best)
 /* Try the planes through all faces from `from` to `to`. */
 static void sweep_faces(const sweep *s, float from, float to, plane *best)
 {
-    const umb_bvh_item *parts = s->k->stack + s->c->first;
+    const umb_bvh_item *parts = s->k->cells.stack + s->c->run.first;
     uint64_t *faces = s->k->faces;
     uint32_t n = 0;
-    division d = {0, s->c->count};
-    for (uint32_t i = 0; i < s->c->count; ++i) {
+    division d = {0, s->c->run.count};
+    for (uint32_t i = 0; i < s->c->run.count; ++i) {
         float low = parts[i].min[s->axis], high = parts[i].max[s->axis];
         if (low < from) {
             ++d.below;
@@ -157,15 +148,15 @@ static void sweep_faces(const sweep *s, float from, float to, plane *best)
 /* Where the best plane lies roughly: the two bins beside it. */
 static void sweep_bins(const sweep *s, plane *best)
 {
-    const umb_bvh_item *parts = s->k->stack + s->c->first;
+    const umb_bvh_item *parts = s->k->cells.stack + s->c->run.first;
     uint32_t lows[BINS] = {0}, highs[BINS] = {0};
     double low = s->box.min[s->axis], extent = s->box.max[s->axis] - low, scale = BINS / extent;
-    for (uint32_t i = 0; i < s->c->count; ++i) {
+    for (uint32_t i = 0; i < s->c->run.count; ++i) {
         int from = (int)((parts[i].min[s->axis] - low) * scale), to = (int)((parts[i].max[s->axis] - low) * scale);
         ++lows[from < BINS ? from : BINS - 1];
         ++highs[to < BINS ? to : BINS - 1];
     }
-    division d = {0, s->c->count};
+    division d = {0, s->c->run.count};
     for (int b = 1; b < BINS; ++b) {
         d.below += lows[b - 1];
         d.above -= highs[b - 1];
@@ -175,21 +166,6 @@ static void sweep_bins(const sweep *s, plane *best)
 
 /* ---- choosing a plane ----------------------------------------------------------------------- */
 
-static umb_aabb box_of_parts(const kd *k, const cell *c)
-{
-    const umb_bvh_item *parts = k->stack + c->first;
-    umb_aabb b;
-    memcpy(b.min, parts[0].min, sizeof(b.min));
-    memcpy(b.max, parts[0].max, sizeof(b.max));
-    for (uint32_t i = 1; i < c->count; ++i) {
-        for (int a = 0; a < 3; ++a) {
-            b.min[a] = parts[i].min[a] < b.min[a] ? parts[i].min[a] : b.min[a];
-            b.max[a] = parts[i].max[a] > b.max[a] ? parts[i].max[a] : b.max[a];
-        }
-    }
-    return b;
-}
-
 static void try_axis(sweep *s, int axis, plane *best)
 {
     float low = s->box.min[axis], high = s->box.max[axis];
@@ -198,7 +174,7 @@ static void try_axis(sweep *s, int axis, plane *best)
     if (!(low < high) || !(s->whole > 0.0)) {
         return;
     }
-    if (s->k->rule == UMB_RULE_MEDIAN || s->c->count <= EXACT_PARTS) {
+    if (s->k->rule == UMB_RULE_MEDIAN || s->c->run.count <= EXACT_PARTS) {
         sweep_faces(s, low, high, best);
         return;
     }
@@ -220,7 +196,7 @@ static void refine(sweep *s, plane *best)
 
 static bool choose(const kd *k, const cell *c, plane *best)
 {
-    sweep s = {.k = k, .c = c, .box = box_of_parts(k, c)};
+    sweep s = {.k = k, .c = c, .box = umb_cells_box(&k->cells, c->run)};
     best->cost = INFINITY;
     if (k->rule == UMB_RULE_MEDIAN) {
         for (uint32_t turn = 0; turn < 3 && isinf(best->cost); ++turn) {
@@ -231,65 +207,26 @@ static bool choose(const kd *k, const cell *c, plane *best)
     for (int axis = 0; axis < 3; ++axis) {
         try_axis(&s, axis, best);
     }
-    if (!isinf(best->cost) && c->count > EXACT_PARTS) {
+    if (!isinf(best->cost) && c->run.count > EXACT_PARTS) {
         refine(&s, best);
     }
-    return best->cost < c->count;
+    return best->cost < c->run.count;
 }
 
 /* ---- recursion ------------------------------------------------------------------------------ */
-
-static void swap(umb_bvh_item *a, umb_bvh_item *b)
-{
-    umb_bvh_item t = *a;
-    *a = *b;
-    *b = t;
-}
-
-/* Order a cell's parts: below a plane, cut by it, above. Returns how many are below, and sets how many are cut. What
- * lies in the plane is below. */
-static uint32_t sort_parts(umb_bvh_item *parts, uint32_t count, const plane *p, uint32_t *cut)
-{
-    uint32_t low = 0, at = 0, high = count;
-    while (at < high) {
-        if (!(parts[at].max[p->axis] > p->at)) {
-            swap(&parts[low++], &parts[at++]);
-        } else if (!(parts[at].min[p->axis] < p->at)) {
-            swap(&parts[at], &parts[--high]);
-        } else {
-            ++at;
-        }
-    }
-    *cut = high - low;
-    return low;
-}
 
 static uint32_t build(kd *k, const cell *c);
 
 static uint32_t build_halves(kd *k, const cell *c, const plane *p)
 {
-    uint32_t cut, middle, below = sort_parts(k->stack + c->first, c->count, p, &cut);
-    uint32_t above = c->count - below;
-    size_t top = k->top;
-    if (!umb_memory_reserve(k->cells.allocator, (void **)&k->stack, &k->capacity, top + above,
-                            sizeof(k->stack[0]))) {
-        k->cells.failed = true;
-        return UMB_NONE;
-    }
-    memcpy(k->stack + top, k->stack + c->first + below, above * sizeof(k->stack[0]));
-    for (uint32_t i = 0; i < cut; ++i) {
-        k->stack[c->first + below + i].max[p->axis] = p->at;
-        k->stack[top + i].min[p->axis] = p->at;
-    }
-    k->top = top + above;
-    uint64_t extra = c->extra - cut, lower = extra * (below + cut) / (c->count + cut);
-    cell half = {c->first, below + cut, c->depth + 1, lower};
-    uint32_t left = build(k, &half);
-    middle = k->cells.count;
-    memmove(k->stack + c->first, k->stack + top, above * sizeof(k->stack[0]));
-    k->top = top;
-    half = (cell){c->first, above, c->depth + 1, extra - lower};
-    uint32_t right = build(k, &half);
+    size_t top = k->cells.top;
+    cell lower = {c->run, c->depth + 1, 0}, upper = lower;
+    uint32_t cut = umb_cells_divide(&k->cells, &lower.run, p->axis, p->at, &upper.run);
+    lower.extra = umb_cells_share(c->extra - cut, lower.run, upper.run);
+    upper.extra = c->extra - cut - lower.extra;
+    uint32_t left = build(k, &lower), middle = k->cells.count;
+    umb_cells_bring_down(&k->cells, c->run.first, &upper.run, top);
+    uint32_t right = build(k, &upper);
     umb_cell_cut where = {.axis = (uint8_t)p->axis, .at = p->at};
     return umb_cells_join(&k->cells, left, middle, right, &where);
 }
@@ -297,24 +234,10 @@ static uint32_t build_halves(kd *k, const cell *c, const plane *p)
 static uint32_t build(kd *k, const cell *c)
 {
     plane p;
-    if (c->count <= LEAF_PARTS || c->depth >= k->most_depth || k->cells.failed || !choose(k, c, &p)) {
-        return umb_cells_add_leaf(&k->cells, k->stack + c->first, c->count);
+    if (c->run.count <= LEAF_PARTS || c->depth >= k->most_depth || k->cells.failed || !choose(k, c, &p)) {
+        return umb_cells_add_leaf(&k->cells, c->run);
     }
     return build_halves(k, c, &p);
-}
-
-static bool start(kd *k, const umb_bvh_item *items, uint32_t count)
-{
-    const umb_allocator *a = k->cells.allocator;
-    if (!umb_memory_reserve(a, (void **)&k->stack, &k->capacity, count, sizeof(k->stack[0])) ||
-        !umb_memory_reserve(a, (void **)&k->faces, &k->face_capacity, 2 * (size_t)count, sizeof(k->faces[0])) ||
-        !umb_memory_reserve(a, (void **)&k->scratch, &k->scratch_capacity, 2 * (size_t)count,
-                            sizeof(k->scratch[0]))) {
-        return false;
-    }
-    memcpy(k->stack, items, count * sizeof(items[0]));
-    k->top = count;
-    return true;
 }
 
 umb_result umb_kdtree_build(const umb_allocator *a, umb_index_rule rule, const umb_bvh_item *items, uint32_t count,
@@ -322,14 +245,14 @@ umb_result umb_kdtree_build(const umb_allocator *a, umb_index_rule rule, const u
 {
     kd k = {.rule = rule, .most_depth = 8 + 3 * (32u - (uint32_t)__builtin_clz(count)) / 2};
     umb_result result = UMB_ERROR_MEMORY;
-    umb_cells_start(&k.cells, a);
+    umb_cells_start(&k.cells, a, items, count);
     *out = (umb_built){0};
-    if (start(&k, items, count)) {
-        cell all = {0, count, 0, (uint64_t)MOST_EXTRA * count};
+    if (umb_memory_reserve(a, (void **)&k.faces, &k.face_capacity, 2 * (size_t)count, sizeof(k.faces[0])) &&
+        umb_memory_reserve(a, (void **)&k.scratch, &k.scratch_capacity, 2 * (size_t)count, sizeof(k.scratch[0]))) {
+        cell all = {{0, count}, 0, (uint64_t)MOST_EXTRA * count};
         uint32_t root = build(&k, &all);
         result = umb_cells_finish(&k.cells, root, out);
     }
-    umb_memory_free(a, k.stack, k.capacity * sizeof(k.stack[0]));
     umb_memory_free(a, k.faces, k.face_capacity * sizeof(k.faces[0]));
     umb_memory_free(a, k.scratch, k.scratch_capacity * sizeof(k.scratch[0]));
     umb_cells_free(&k.cells);

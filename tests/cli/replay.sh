@@ -3,7 +3,7 @@
 view="--path gen:blocks,g=6 --row 5"
 
 "$umbrage" generate gen:blocks,g=6 -o scene.glb >out
-for index in bvh flat kdtree,median; do
+for index in bvh flat kdtree,median octree; do
     for method in raster none; do
         run cull scene.glb $view --index $index --method $method --capture frame.umb --json
         hash=$(jq -r .hash out)

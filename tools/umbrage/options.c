@@ -467,7 +467,7 @@ static const option_spec specs[] = {
      "depth of the far plane (default: the scene's farthest corner)"},
 
     {"method", 0, VIEWS, "NAME", read_method, "raster or none: frustum only (default raster)"},
-    {"index", 0, SCENES, "NAME", read_index, "how objects are found: bvh, flat, kdtree; see the manual (default bvh)"},
+    {"index", 0, SCENES, "NAME", read_index, "bvh, flat, kdtree, octree, quadtree, grid: how objects are found (default bvh)"},
     {"buffer", 0, VIEWS, "WxH", read_buffer, "the method's own raster (default 1024x288)"},
     {"coherence", 0, MANY_VIEWS, "NAMES", read_coherence,
      "carry over: list, hierarchy, propagation, conservative, rest, all (default none)"},
