@@ -7,8 +7,6 @@
 #include "base/isa.h"
 #include "region_state.h"
 
-#define MOST_SOLIDS 32
-
 umb_result umb_region_fail(const umb_region *region, umb_result code, const char *format, ...)
 {
     if (region->error != NULL) {
@@ -40,7 +38,8 @@ umb_result umb_region_create(umb_index *index, const umb_region_def *def, umb_re
     region->allocator = *a;
     region->tasks = def->tasks;
     region->error = def->error;
-    region->isa = isa;
+    region->kernels = umb_umbra_kernels_get(isa);
+    region->pieces.allocator = &region->allocator;
     region->solids.allocator = &region->allocator;
     *out = region;
     return UMB_OK;
@@ -53,6 +52,11 @@ void umb_region_destroy(umb_region *region)
     }
     umb_allocator a = region->allocator;
     umb_solids_free(&region->solids);
+    umb_pieces_free(&region->pieces);
+    for (int i = 0; i < UMB_REGION_MAPS; ++i) {
+        umb_ray_map_free(&region->maps[i], &a);
+    }
+    umb_memory_free(&a, region->queue, region->queue_capacity * sizeof *region->queue);
     umb_memory_free(&a, region->pvs, region->pvs_capacity * sizeof *region->pvs);
     umb_memory_free(&a, region->refined, region->refined_capacity * sizeof *region->refined);
     umb_memory_free(&a, region, sizeof *region);
@@ -79,98 +83,6 @@ static umb_result check_query(const umb_region *region, const umb_region_query *
         return umb_region_fail(region, UMB_ERROR_ARGUMENT, "near_depth must be finite and not negative");
     }
     return UMB_OK;
-}
-
-/* ---- what may block ----------------------------------------------------------------------------- */
-
-/* Square of the distance between a box and the cell. */
-static double gap_squared(const umb_region_query *q, const umb_aabb *b)
-{
-    double sum = 0.0;
-    for (int k = 0; k < 3; ++k) {
-        double below = q->min[k] - b->max[k], above = b->min[k] - q->max[k];
-        double gap = fmax(0.0, fmax(below, above));
-        sum += gap * gap;
-    }
-    return sum;
-}
-
-static double area(const umb_aabb *b)
-{
-    double x = (double)b->max[0] - b->min[0], y = (double)b->max[1] - b->min[1];
-    double z = (double)b->max[2] - b->min[2];
-    return x * y + y * z + z * x;
-}
-
-/* The occluders with the largest area for their distance. */
-static umb_result choose_solids(umb_region *region)
-{
-    const umb_committed *c = umb_scene_committed(umb_index_scene(region->index));
-    double least_gap = 4.0 * region->query.near_depth, scores[MOST_SOLIDS];
-    uint32_t chosen[MOST_SOLIDS], count = 0;
-    for (uint32_t i = 0; i < c->occluder_count; ++i) {
-        double gap = gap_squared(&region->query, &c->occluders[i].bounds);
-        if (!c->occluders[i].mesh->convex || gap < least_gap * least_gap) {
-            continue;
-        }
-        double score = area(&c->occluders[i].bounds) / (gap + 1e-30);
-        if (count == MOST_SOLIDS && score <= scores[count - 1]) {
-            continue;
-        }
-        uint32_t at = count < MOST_SOLIDS ? count++ : count - 1;
-        for (; at > 0 && scores[at - 1] < score; --at) {
-            scores[at] = scores[at - 1];
-            chosen[at] = chosen[at - 1];
-        }
-        scores[at] = score;
-        chosen[at] = i;
-    }
-    for (uint32_t k = 0; k < count; ++k) {
-        bool added;
-        umb_result result = umb_solids_add(&region->solids, &c->occluders[chosen[k]], chosen[k],
-                                           (const double(*)[3])region->corners, &added);
-        if (result != UMB_OK) {
-            return result;
-        }
-        region->answer.stats.occluders += added ? 1 : 0;
-    }
-    return UMB_OK;
-}
-
-static bool box_hidden(umb_region *region, const double min[3], const double max[3])
-{
-    double corners[8][3];
-    umb_box_corners(min, max, corners);
-    umb_corners cell = {(const double(*)[3])region->corners, 8}, box = {(const double(*)[3])corners, 8};
-    region->answer.stats.queries += 1;
-    for (size_t i = 0; i < region->solids.count; ++i) {
-        if (umb_solid_blocks(&region->solids, &region->solids.items[i], cell, box, true) == 64) {
-            return true;
-        }
-    }
-    return false;
-}
-
-static void walk(umb_region *region, const umb_tree *tree, uint32_t number)
-{
-    const umb_node *n = umb_tree_node(tree, number);
-    region->answer.stats.nodes += 1;
-    for (uint32_t s = 0; s < n->count; ++s) {
-        double min[3], max[3];
-        for (int k = 0; k < 3; ++k) {
-            min[k] = n->min[k][s];
-            max[k] = n->max[k][s];
-        }
-        uint32_t kind = n->ref[s] & UMB_REF_KIND;
-        if (kind == UMB_REF_OCCLUDER || box_hidden(region, min, max)) {
-            continue;
-        }
-        if (kind == UMB_REF_NODE) {
-            walk(region, tree, n->ref[s] & UMB_REF_NUMBER);
-        } else {
-            region->pvs[region->answer.pvs_count++] = n->ref[s] & UMB_REF_NUMBER;
-        }
-    }
 }
 
 /* ---- public --------------------------------------------------------------------------------- */
@@ -217,6 +129,26 @@ static double largest(const umb_region_query *q, const umb_tree *tree)
     return reach;
 }
 
+/* The query with its defaults, and a cell that is nowhere thinner than what numbers of the scene's size can tell apart:
+ * a larger cell sees more. */
+static void set_cell(umb_region *region, const umb_region_query *query)
+{
+    umb_region_query *q = &region->query;
+    *q = *query;
+    uint32_t resolution = q->resolution != 0 ? q->resolution : 512, side = UMB_TILE * UMB_TILE;
+    q->resolution = (resolution + side - 1) / side * side;
+    q->umbrae = q->half_umbra ? 1 : q->umbrae != 0 ? q->umbrae : 2;
+    uint32_t up = q->up == UMB_UP_Y ? 1 : q->up == UMB_UP_Z ? 2 : 0;
+    for (uint32_t k = 0; k < 3; ++k) {
+        double middle = 0.5 * (q->min[k] + q->max[k]), least = 0x1p-22 * region->reach;
+        if (k != up && !(q->max[k] - q->min[k] >= 2.0 * least)) {
+            q->min[k] = fmin(q->min[k], middle - least);
+            q->max[k] = fmax(q->max[k], middle + least);
+        }
+    }
+    umb_box_corners(q->min, q->max, region->corners);
+}
+
 static umb_result prepare(umb_region *region, const umb_region_query *query)
 {
     const umb_tree *tree = umb_index_tree(region->index);
@@ -230,10 +162,10 @@ static umb_result prepare(umb_region *region, const umb_region_query *query)
                             c->object_count, sizeof *region->refined)) {
         return UMB_ERROR_MEMORY;
     }
-    region->query = *query;
-    umb_box_corners(query->min, query->max, region->corners);
+    region->reach = largest(query, tree);
+    set_cell(region, query);
     region->solids.count = region->solids.plane_count = 0;
-    region->solids.reach = largest(query, tree);
+    region->solids.reach = region->reach;
     for (uint32_t i = 0; i < c->object_count; ++i) {
         if (c->objects[i].live) {
             region->answer.stats.objects += 1;
@@ -245,7 +177,6 @@ static umb_result prepare(umb_region *region, const umb_region_query *query)
 
 umb_result umb_region_solve(umb_region *region, const umb_region_query *query, umb_region_answer *out)
 {
-    const umb_tree *tree = umb_index_tree(region->index);
     const umb_committed *c = umb_scene_committed(umb_index_scene(region->index));
     memset(out, 0, sizeof *out);
     memset(&region->answer, 0, sizeof region->answer);
@@ -255,14 +186,9 @@ umb_result umb_region_solve(umb_region *region, const umb_region_query *query, u
         return result;
     }
     result = prepare(region, query);
-    result = result == UMB_OK ? choose_solids(region) : result;
+    result = result == UMB_OK ? umb_region_walk(region) : result;
     if (result != UMB_OK) {
         return result == UMB_ERROR_MEMORY ? umb_region_fail(region, result, "no memory for a view cell") : result;
-    }
-    if (tree->node_count > 0) {
-        for (uint32_t k = 0; k < (tree->flat ? tree->node_count : 1); ++k) {
-            walk(region, tree, k);
-        }
     }
     umb_region_answer *a = &region->answer;
     qsort(region->pvs, a->pvs_count, sizeof *region->pvs, by_id);

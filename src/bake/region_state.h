@@ -3,25 +3,41 @@
 #define UMB_REGION_STATE_H
 
 #include "index/tree.h"
+#include "pieces.h"
+#include "ray_map.h"
 #include "solid.h"
 #include "umbrage/region.h"
+
+#define UMB_REGION_MAPS 8
 
 struct umb_region {
     umb_index *index;
     umb_allocator allocator;
     umb_tasks tasks;
     umb_error *error;
-    umb_isa isa;
+    const umb_umbra_kernels *kernels;
 
     umb_region_query query; /* of the last solve, defaults filled in */
     double corners[8][3];   /* of its cell */
+    double reach;           /* no coordinate of scene or cell is larger */
     bool solved;
+
+    umb_ray_frame frames[4];
+    umb_ray_map maps[UMB_REGION_MAPS]; /* of frame k: k, and k + 4 with squares */
+    uint32_t map_count;
+    double floor; /* the lowest point of scene and cell */
+    umb_pieces pieces;
+    uint64_t *queue; /* what is waiting: a heap of orders */
+    size_t queue_capacity, queue_count;
     umb_solids solids;
 
     uint32_t *pvs, *refined;
     size_t pvs_capacity, refined_capacity;
     umb_region_answer answer;
 };
+
+/* Find the set of the cell by occlusion maps. */
+umb_result umb_region_walk(umb_region *region);
 
 /* Fill in region->error and return code. */
 umb_result umb_region_fail(const umb_region *region, umb_result code, const char *format, ...)

@@ -1,0 +1,109 @@
+#include "closed_solid.h"
+
+#include <math.h>
+
+#include "geometry/orient.h"
+#include "geometry/vec.h"
+
+static bool all_edges_paired(const umb_mesh *m)
+{
+    for (uint32_t i = 0; i < m->edge_count; ++i) {
+        if (m->edges[i].f1 == UMB_NONE || (m->edges[i].f1 & UMB_EDGE_SAME) != 0) {
+            return false;
+        }
+    }
+    return m->any_two_sided == 0;
+}
+
+/* Every corner of t lies on one closed side of the plane of s. */
+static bool beside(const float (*p)[3], const uint32_t s[3], const uint32_t t[3])
+{
+    bool front = false, back = false;
+    for (int k = 0; k < 3; ++k) {
+        if (t[k] == s[0] || t[k] == s[1] || t[k] == s[2]) {
+            continue;
+        }
+        int side = umb_orient(p[s[0]], p[s[1]], p[s[2]], p[t[k]]);
+        front = front || side > 0;
+        back = back || side < 0;
+    }
+    return !(front && back);
+}
+
+static bool boxes_apart(const float (*p)[3], const uint32_t s[3], const uint32_t t[3])
+{
+    for (int k = 0; k < 3; ++k) {
+        float s_max = fmaxf(p[s[0]][k], fmaxf(p[s[1]][k], p[s[2]][k]));
+        float s_min = fminf(p[s[0]][k], fminf(p[s[1]][k], p[s[2]][k]));
+        float t_max = fmaxf(p[t[0]][k], fmaxf(p[t[1]][k], p[t[2]][k]));
+        float t_min = fminf(p[t[0]][k], fminf(p[t[1]][k], p[t[2]][k]));
+        if (s_max < t_min || t_max < s_min) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static bool none_cross(const umb_mesh *m, const float (*p)[3])
+{
+    for (uint32_t i = 0; i < m->triangle_count; ++i) {
+        for (uint32_t k = i + 1; k < m->triangle_count; ++k) {
+            const uint32_t *s = m->triangles[i], *t = m->triangles[k];
+            if (!boxes_apart(p, s, t) && !beside(p, s, t) && !beside(p, t, s)) {
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+static uint32_t root_of(uint8_t *parent, uint32_t i)
+{
+    while (parent[i] != i) {
+        i = parent[i];
+    }
+    return i;
+}
+
+/* Six times the volume under a triangle, and a bound of all the roundings of it: terms are products of three
+ * coordinates that are at most size. */
+static double volume_under(const float (*p)[3], const uint32_t t[3])
+{
+    umb_vec3 a = umb_vec3_sub(umb_vec3_from_float(p[t[0]]), umb_vec3_from_float(p[0]));
+    umb_vec3 b = umb_vec3_sub(umb_vec3_from_float(p[t[1]]), umb_vec3_from_float(p[0]));
+    umb_vec3 c = umb_vec3_sub(umb_vec3_from_float(p[t[2]]), umb_vec3_from_float(p[0]));
+    return umb_vec3_dot(a, umb_vec3_cross(b, c));
+}
+
+static bool volumes_positive(const umb_occluder *o, const float (*p)[3])
+{
+    const umb_mesh *m = o->mesh;
+    uint8_t parent[UMB_CLOSED_SOLID_MOST];
+    double volume[UMB_CLOSED_SOLID_MOST] = {0.0}, size = 0.0;
+    for (uint32_t i = 0; i < m->triangle_count; ++i) {
+        parent[i] = (uint8_t)i;
+    }
+    for (uint32_t i = 0; i < m->edge_count; ++i) {
+        parent[root_of(parent, m->edges[i].f0)] = (uint8_t)root_of(parent, m->edges[i].f1);
+    }
+    for (int k = 0; k < 3; ++k) {
+        size = fmax(size, (double)o->bounds.max[k] - o->bounds.min[k]);
+    }
+    for (uint32_t i = 0; i < m->triangle_count; ++i) {
+        volume[root_of(parent, i)] += (o->mirrored ? -1.0 : 1.0) * volume_under(p, m->triangles[i]);
+    }
+    double lost = 0x1p-40 * size * size * size;
+    for (uint32_t i = 0; i < m->triangle_count; ++i) {
+        if (!(volume[root_of(parent, i)] > lost)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+bool umb_closed_solid(const umb_occluder *o, const float (*positions)[3])
+{
+    const umb_mesh *m = o->mesh;
+    return m->triangle_count >= 4 && m->triangle_count <= UMB_CLOSED_SOLID_MOST && all_edges_paired(m) &&
+           volumes_positive(o, positions) && none_cross(m, positions);
+}

@@ -1,0 +1,411 @@
+/* Occluders into occlusion maps: which chains, which tiles. */
+#include <math.h>
+#include <string.h>
+
+#include "ray_map.h"
+
+/* Everything about one blocker in one tile row. */
+typedef struct band {
+    umb_ray_map *map;
+    const umb_umbra_kernels *kernels;
+    const umb_ray_blocker *blocker;
+    bool half;
+    uint32_t row; /* of tiles */
+    double s;     /* its first corner */
+    uint8_t top[UMB_UMBRA_VERTICES + 1], bottom[UMB_UMBRA_VERTICES + 1]; /* chains of vertices */
+    uint32_t top_count, bottom_count;
+    umb_umbra umbra;
+    int16_t place[UMB_UMBRA_VERTICES]; /* of a vertex in umbra.vertices, -1: not there */
+    uint32_t used;
+} band;
+
+/* ---- chains ----------------------------------------------------------------------------------- */
+
+typedef struct sight {
+    double t, top, bottom; /* as seen from where all lines of the row nearly meet */
+    uint8_t vertex;
+} sight;
+
+static double slope_of(double rise, double run)
+{
+    return rise / run;
+}
+
+/* A chain of a convex body that is highest (sign 1) or lowest (-1) as seen from there. Any chain would be
+ * right. */
+static uint32_t hull_chain(const sight *p, uint32_t count, double sign, uint8_t *chain)
+{
+    uint32_t kept[UMB_UMBRA_VERTICES], n = 0;
+    for (uint32_t i = 0; i < count; ++i) {
+        double y = sign > 0.0 ? p[i].top : -p[i].bottom;
+        if (n > 0 && p[kept[n - 1]].t == p[i].t) {
+            double last = sign > 0.0 ? p[kept[n - 1]].top : -p[kept[n - 1]].bottom;
+            if (last >= y) {
+                continue;
+            }
+            --n;
+        }
+        while (n >= 2) {
+            const sight *a = &p[kept[n - 2]], *b = &p[kept[n - 1]];
+            double ya = sign > 0.0 ? a->top : -a->bottom, yb = sign > 0.0 ? b->top : -b->bottom;
+            if ((yb - ya) * (p[i].t - a->t) > (y - ya) * (b->t - a->t)) {
+                break;
+            }
+            --n;
+        }
+        kept[n++] = i;
+    }
+    for (uint32_t i = 0; i < n; ++i) {
+        chain[i] = p[kept[i]].vertex;
+    }
+    return n;
+}
+
+static void convex_chains(band *d)
+{
+    const umb_ray_map *m = d->map;
+    const umb_ray_blocker *b = d->blocker;
+    sight sights[UMB_UMBRA_VERTICES];
+    double s = d->s + 0.5 * UMB_TILE * m->ds;
+    for (uint32_t i = 0; i < b->count; ++i) {
+        const umb_ray_point *p = &b->vertices[i];
+        double alpha = m->alpha0 + m->alpha1 * p->u, beta = m->beta0 + m->beta1 * p->u;
+        sight x = {(p->v - alpha * s) / beta, slope_of(p->z - m->frame->z1, beta),
+                   slope_of(p->z - m->frame->z0, beta), (uint8_t)i};
+        uint32_t k = i;
+        for (; k > 0 && sights[k - 1].t > x.t; --k) {
+            sights[k] = sights[k - 1];
+        }
+        sights[k] = x;
+    }
+    d->top_count = hull_chain(sights, b->count, 1.0, d->top);
+    d->bottom_count = hull_chain(sights, b->count, -1.0, d->bottom);
+}
+
+static double value_at(const umb_ray_map *m, const umb_ray_point *p, double s, double t)
+{
+    return p->v - (m->alpha0 + m->alpha1 * p->u) * s - (m->beta0 + m->beta1 * p->u) * t;
+}
+
+/* The two chains of a ring between the vertex that lines from t0 on have to one side and the one that lines up to t1
+ * have to the other. */
+static void ring_chains(band *d, double t0, double t1)
+{
+    const umb_ray_map *m = d->map;
+    const umb_ray_blocker *b = d->blocker;
+    double s = d->s + 0.5 * UMB_TILE * m->ds, least = INFINITY, most = -INFINITY;
+    uint32_t low = 0, high = 0, n = 0;
+    for (uint32_t i = 0; i < b->ring; ++i) {
+        double f0 = value_at(m, &b->vertices[i], s, t0), f1 = value_at(m, &b->vertices[i], s, t1);
+        low = f0 < least ? i : low;
+        least = f0 < least ? f0 : least;
+        high = f1 > most ? i : high;
+        most = f1 > most ? f1 : most;
+    }
+    double sums[2] = {0.0, 0.0};
+    for (uint32_t i = low; i != high; i = (i + 1) % b->ring) {
+        d->top[n++] = (uint8_t)i;
+        sums[0] += b->vertices[i].z;
+    }
+    d->top[n] = (uint8_t)high;
+    sums[0] = (sums[0] - b->vertices[low].z) / (n > 1 ? n - 1 : 1);
+    d->top_count = n + 1;
+    n = 0;
+    for (uint32_t i = low; i != high; i = (i + b->ring - 1) % b->ring) {
+        d->bottom[n++] = (uint8_t)i;
+        sums[1] += b->vertices[i].z;
+    }
+    d->bottom[n] = (uint8_t)high;
+    sums[1] = (sums[1] - b->vertices[low].z) / (n > 1 ? n - 1 : 1);
+    d->bottom_count = n + 1;
+    /* A chain without inner vertices is a straight edge between the two. */
+    double middle = 0.5 * (b->vertices[low].z + b->vertices[high].z);
+    double a = d->top_count > 2 ? sums[0] : middle, z = d->bottom_count > 2 ? sums[1] : middle;
+    if (a < z) {
+        uint8_t swap[UMB_UMBRA_VERTICES + 1];
+        memcpy(swap, d->top, sizeof swap);
+        memcpy(d->top, d->bottom, sizeof swap);
+        memcpy(d->bottom, swap, sizeof swap);
+        n = d->top_count;
+        d->top_count = d->bottom_count;
+        d->bottom_count = n;
+    }
+}
+
+/* ---- an umbra for the kernels -------------------------------------------------------------------- */
+
+/* Bounds at a vertex: numerators and denominators are sums of doubles, right to far less than a float's step. */
+static void bound_vertex(const umb_ray_map *m, const umb_ray_point *p, float ua, float ub, float error_u,
+                         umb_umbra_vertex *v)
+{
+    double e = m->frame->error, up = p->z - m->frame->z1, rise = p->z - m->frame->z0;
+    double a = p->u - ua, b = p->u - ub;
+    v->depth = nextafterf((float)(p->u + e), INFINITY);
+    v->margin = (float)(b - 16.0 * error_u);
+    if (!(v->margin > 0.0f)) {
+        v->top = v->top_far = -INFINITY;
+        v->bottom = v->bottom_far = INFINITY;
+        return;
+    }
+    double qa1 = up > e ? (up - e) / (a + e) : (up - e) / (a - e), qb1 = up > e ? (up - e) / (b + e) : (up - e) / (b - e);
+    double qa0 = rise > e ? (rise - e) / (a + e) : (rise - e) / (a - e);
+    double qb0 = rise > e ? (rise - e) / (b + e) : (rise - e) / (b - e);
+    v->top = nextafterf((float)fmin(qa1, qb1), -INFINITY);
+    v->top_far = nextafterf((float)fmin(qa0, qb0), -INFINITY);
+    qa1 = up < -e ? (up + e) / (a + e) : (up + e) / (a - e);
+    qb1 = up < -e ? (up + e) / (b + e) : (up + e) / (b - e);
+    qa0 = rise < -e ? (rise + e) / (a + e) : (rise + e) / (a - e);
+    qb0 = rise < -e ? (rise + e) / (b + e) : (rise + e) / (b - e);
+    v->bottom = nextafterf((float)fmax(qa0, qb0), INFINITY);
+    v->bottom_far = nextafterf((float)fmax(qa1, qb1), INFINITY);
+}
+
+static uint8_t use_vertex(band *d, uint32_t i, uint32_t column, uint32_t columns)
+{
+    if (d->place[i] >= 0) {
+        return (uint8_t)d->place[i];
+    }
+    const umb_ray_map *m = d->map;
+    const umb_ray_point *p = &d->blocker->vertices[i];
+    umb_umbra_vertex *v = &d->umbra.vertices[d->used];
+    double alpha = m->alpha0 + m->alpha1 * p->u, beta = m->beta0 + m->beta1 * p->u;
+    double t = m->t0 + column * m->dt, f = p->v - alpha * d->s - beta * t;
+    double ds = alpha * m->ds, dt = beta * m->dt;
+    /* f, ds and dt are rounded to floats once, products and sums of the kernel four times, of numbers not above
+       size: 2^-22 of it. What doubles lose before is within the second term. The kernel wants four times that. */
+    double size = fabs(f) + (UMB_TILE + 1) * fabs(ds) + (columns + 1) * fabs(dt);
+    double lost = 0x1p-44 * (fabs(p->v) + fabs(alpha * d->s) + fabs(beta * t));
+    double shift = m->frame->error * (1.0 + fabs(m->alpha1 * d->s) + fabs(m->beta1 * t) + 1.0);
+    v->f = (float)f;
+    v->ds = (float)ds;
+    v->dt = (float)dt;
+    v->error = (float)(4.0 * (0x1p-22 * size + lost + shift));
+    v->u = (float)p->u;
+    v->z = (float)p->z;
+    bound_vertex(m, p, d->umbra.ua, d->umbra.ub, d->umbra.error_u, v);
+    d->place[i] = (int16_t)d->used;
+    return (uint8_t)d->used++;
+}
+
+/* On which sides of a vertex lines of the run may pass: bit 0: below, bit 1: above. */
+static uint32_t sides(const umb_umbra_vertex *v, uint32_t columns)
+{
+    float f = v->f, ds = UMB_TILE * v->ds, dt = (float)columns * v->dt;
+    float low = f - (ds > 0.0f ? ds : 0.0f) - (dt > 0.0f ? dt : 0.0f) - v->error;
+    float high = f - (ds < 0.0f ? ds : 0.0f) - (dt < 0.0f ? dt : 0.0f) + v->error;
+    return (low <= 0.0f ? 1u : 0u) | (high >= 0.0f ? 2u : 0u);
+}
+
+static bool may_cross(const umb_umbra *o, umb_umbra_edge e, uint32_t columns)
+{
+    return (sides(&o->vertices[e.a], columns) | sides(&o->vertices[e.b], columns)) == 3u;
+}
+
+/* A chain's edges that may be crossed in the run, and the inner vertices that may be straddled. reference: the height
+ * that its far bound is measured from; over it the near quotient is the larger one, under it the farther. */
+static uint32_t use_chain(band *d, const uint8_t *chain, uint32_t count, uint32_t column, uint32_t columns,
+                          bool top, umb_umbra_edge *edges, uint64_t *inner)
+{
+    const umb_ray_blocker *b = d->blocker;
+    double z = top ? d->map->frame->z0 : d->map->frame->z1;
+    uint32_t n = 0;
+    *inner = 0;
+    for (uint32_t i = 0; i + 1 < count; ++i) {
+        double za = b->vertices[chain[i]].z - z, zb = b->vertices[chain[i + 1]].z - z;
+        umb_umbra_edge e = {use_vertex(d, chain[i], column, columns), use_vertex(d, chain[i + 1], column, columns), 0};
+        e.near_quotient = top ? !(za < 0.0 && zb < 0.0) : !(za > 0.0 && zb > 0.0);
+        if (i > 0 && sides(&d->umbra.vertices[e.a], columns) == 3u) {
+            *inner |= UINT64_C(1) << e.a;
+        }
+        if (may_cross(&d->umbra, e, columns)) {
+            edges[n++] = e;
+        }
+    }
+    return n;
+}
+
+static bool same_outline(const band *d)
+{
+    if (d->top_count != d->bottom_count) {
+        return false;
+    }
+    for (uint32_t i = 0; i < d->top_count; ++i) {
+        const umb_ray_point *a = &d->blocker->vertices[d->top[i]], *b = &d->blocker->vertices[d->bottom[i]];
+        if (a->u != b->u || a->v != b->v) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static void use_inner_edges(band *d, uint32_t column, uint32_t columns)
+{
+    const umb_ray_blocker *b = d->blocker;
+    umb_umbra *o = &d->umbra;
+    for (uint32_t i = 0; i < b->inner_edge_count; ++i) {
+        umb_umbra_edge e = {use_vertex(d, b->inner_edges[i][0], column, columns),
+                            use_vertex(d, b->inner_edges[i][1], column, columns), 0};
+        if (may_cross(o, e, columns)) {
+            o->depth[o->depth_count++] = e;
+        }
+    }
+    for (uint32_t i = b->ring; i < b->count; ++i) {
+        o->depth_inner |= UINT64_C(1) << use_vertex(d, i, column, columns);
+    }
+}
+
+static void make_umbra(band *d, uint32_t column, uint32_t columns, bool floor, const float span[2])
+{
+    const umb_ray_blocker *b = d->blocker;
+    const umb_ray_frame *f = d->map->frame;
+    umb_umbra *o = &d->umbra;
+    double u = 0.0, z = fmax(fabs(f->z0), fabs(f->z1));
+    for (uint32_t i = 0; i < b->count; ++i) {
+        u = fmax(u, fabs(b->vertices[i].u));
+        z = fmax(z, fabs(b->vertices[i].z));
+        d->place[i] = -1;
+    }
+    d->used = 0;
+    o->depth_count = 0;
+    o->depth_inner = 0;
+    o->z0 = (float)f->z0;
+    o->z1 = (float)f->z1;
+    o->ua = span[0];
+    o->ub = span[1];
+    o->error_u = (float)(0x1p-20 * fmax(u, f->hu) + 2.0 * f->error);
+    o->error_z = (float)(0x1p-20 * z + 2.0 * f->error);
+    o->floor = floor;
+    o->top_count = use_chain(d, d->top, d->top_count, column, columns, true, o->top, &o->top_inner);
+    o->low[0] = (uint32_t)d->place[d->top[0]];
+    o->high[0] = (uint32_t)d->place[d->top[d->top_count - 1]];
+    o->low[1] = o->low[0];
+    o->high[1] = o->high[0];
+    o->bottom_count = 0;
+    o->bottom_inner = 0;
+    if (!floor || !same_outline(d)) {
+        o->bottom_count = use_chain(d, d->bottom, d->bottom_count, column, columns, false, o->bottom, &o->bottom_inner);
+        o->low[1] = (uint32_t)d->place[d->bottom[0]];
+        o->high[1] = (uint32_t)d->place[d->bottom[d->bottom_count - 1]];
+    }
+    if (!b->convex) {
+        use_inner_edges(d, column, columns);
+    }
+}
+
+/* ---- tiles -------------------------------------------------------------------------------------- */
+
+/* Bounds that no pixel's interval of the run exceeds: m and M of points of a chain are largest and least at its
+ * vertices. */
+static umb_umbra_summary reach_of(const band *d, bool floor, const float span[2])
+{
+    const umb_ray_frame *f = d->map->frame;
+    umb_umbra_summary r = {-INFINITY, floor ? -INFINITY : INFINITY, 0.0f};
+    for (uint32_t i = 0; i < d->top_count; ++i) {
+        const umb_ray_point *p = &d->blocker->vertices[d->top[i]];
+        double up = p->z - f->z1, from = up >= 0.0 ? p->u - span[0] : p->u - span[1];
+        r.top = from > 0.0 ? fmaxf(r.top, (float)(up / from)) : INFINITY;
+    }
+    for (uint32_t i = 0; i < d->bottom_count && !floor; ++i) {
+        const umb_ray_point *p = &d->blocker->vertices[d->bottom[i]];
+        double rise = p->z - f->z0, from = rise >= 0.0 ? p->u - span[1] : p->u - span[0];
+        r.bottom = from > 0.0 ? fminf(r.bottom, (float)(rise / from)) : -INFINITY;
+    }
+    return r;
+}
+
+static void draw_run(band *d, uint32_t group, uint32_t from, uint32_t to)
+{
+    umb_ray_map *m = d->map;
+    uint32_t groups = m->tiles / UMB_TILE;
+    const float *span = m->spans[d->row * groups + group];
+    double t0 = m->t0 + from * UMB_TILE * m->dt, t1 = m->t0 + (to + 1) * UMB_TILE * m->dt;
+    if (!d->blocker->convex) {
+        ring_chains(d, t0, t1);
+    }
+    bool floor = d->blocker->floor;
+    for (uint32_t i = 0; floor && i < d->bottom_count; ++i) {
+        floor = d->blocker->on_floor[d->bottom[i]];
+    }
+    if (d->top_count < 2 || d->bottom_count < 2 || (d->half && !floor)) {
+        return;
+    }
+    umb_umbra_summary reach = reach_of(d, floor, span);
+    bool wanted[UMB_TILE];
+    uint32_t first = UMB_NONE, last = 0;
+    for (uint32_t j = from; j <= to; ++j) {
+        const umb_umbra_summary *s = &m->summaries[d->row * m->tiles + j];
+        wanted[j - group * UMB_TILE] = !(s->top >= reach.top && s->bottom <= reach.bottom);
+        if (wanted[j - group * UMB_TILE]) {
+            first = first == UMB_NONE ? j : first;
+            last = j;
+        }
+    }
+    if (first == UMB_NONE) {
+        return;
+    }
+    umb_umbra_draw draw = {.umbra = &d->umbra, .umbrae = m->umbrae, .half = d->half, .tile_count = last - first + 1};
+    for (uint32_t j = first; j <= last; ++j) {
+        uint32_t tile = d->row * m->tiles + j;
+        if (!wanted[j - group * UMB_TILE]) {
+            continue;
+        }
+        draw.tiles[j - first] = &m->intervals[(size_t)tile * m->umbrae];
+        if (!m->drawn[tile]) {
+            umb_umbra_clear(draw.tiles[j - first], m->umbrae, m->live[tile]);
+            m->drawn[tile] = true;
+        }
+    }
+    make_umbra(d, first * UMB_TILE, draw.tile_count * UMB_TILE, floor, span);
+    d->kernels->draw(&draw);
+    for (uint32_t j = first; j <= last; ++j) {
+        if (draw.tiles[j - first] != NULL) {
+            m->summaries[d->row * m->tiles + j] = draw.summaries[j - first];
+        }
+    }
+    m->stale[(d->row / UMB_TILE) * groups + group] = true;
+}
+
+/* Tiles of the row that lines through the blocker may go through. */
+static bool range_of_tiles(const band *d, uint32_t *from, uint32_t *to)
+{
+    const umb_ray_map *m = d->map;
+    double least = INFINITY, most = -INFINITY, width = UMB_TILE * m->dt;
+    for (uint32_t i = 0; i < d->blocker->count; ++i) {
+        const umb_ray_point *p = &d->blocker->vertices[i];
+        double alpha = m->alpha0 + m->alpha1 * p->u, beta = m->beta0 + m->beta1 * p->u;
+        if (!(beta > 1e-9 * (fabs(m->beta0) + fabs(m->beta1 * p->u)))) {
+            *from = 0;
+            *to = m->tiles - 1;
+            return true;
+        }
+        double a = (p->v - alpha * d->s) / beta, b = (p->v - alpha * (d->s + UMB_TILE * m->ds)) / beta;
+        least = fmin(least, fmin(a, b));
+        most = fmax(most, fmax(a, b));
+    }
+    double first = fmax(0.0, floor((least - m->t0) / width)), last = fmin(m->tiles - 1.0, floor((most - m->t0) / width));
+    if (!(first <= last)) {
+        return false;
+    }
+    *from = (uint32_t)first;
+    *to = (uint32_t)last;
+    return true;
+}
+
+void umb_ray_map_block(umb_ray_map *map, const umb_umbra_kernels *kernels, const umb_ray_blocker *b, bool half)
+{
+    band d = {.map = map, .kernels = kernels, .blocker = b, .half = half};
+    for (d.row = 0; d.row < map->tiles; ++d.row) {
+        uint32_t from, to;
+        d.s = map->s0 + d.row * UMB_TILE * map->ds;
+        if (!range_of_tiles(&d, &from, &to)) {
+            continue;
+        }
+        if (b->convex) {
+            convex_chains(&d);
+        }
+        for (uint32_t g = from / UMB_TILE; g <= to / UMB_TILE; ++g) {
+            uint32_t first = g * UMB_TILE, last = first + UMB_TILE - 1;
+            draw_run(&d, g, from > first ? from : first, to < last ? to : last);
+        }
+    }
+}

@@ -1,0 +1,90 @@
+/* Occlusion maps over horizontal rays (thesis 2.1; docs/conservative.md on regions, section "Rays").
+ *
+ * A frame looks along one of the four horizontal directions: u forwards, v sideways, z up, from the middle of the
+ * cell, which is |u| <= hu, |v| <= hv, z0 <= z <= z1. A map's pixels are sets of horizontal lines
+ *     v(u) = alpha(u) s + beta(u) t,    alpha(u) = alpha0 + alpha1 u,    beta(u) = beta0 + beta1 u:
+ * two parallel edges of concentric squares, or offset and slope. f = v - alpha(u) s - beta(u) t of a point says on
+ * which side of a line it lies. */
+#ifndef UMB_RAY_MAP_H
+#define UMB_RAY_MAP_H
+
+#include "base/memory.h"
+#include "umbra_kernels.h"
+
+/* A view cell as a frame sees it. */
+typedef struct umb_ray_frame {
+    double hu, hv, z0, z1;
+    double centre[3];   /* of the cell, z too */
+    uint32_t axis_u, axis_v, axis_z;
+    double sign;        /* of u along axis_u */
+    double error;       /* bound of rounding of a coordinate in the frame */
+} umb_ray_frame;
+
+/* In front of the squares' outer edge, alpha changes its sign at uo: nothing depends on that. */
+typedef struct umb_ray_map {
+    const umb_ray_frame *frame;
+    double alpha0, alpha1, beta0, beta1;
+    double s0, t0, ds, dt; /* corner of pixel 0, 0 and the size of a pixel */
+    uint32_t tiles;        /* along a side: a multiple of UMB_TILE */
+    uint32_t umbrae;
+    umb_umbra_tile *intervals;     /* [tile][umbra]; of a tile never drawn into: not set */
+    umb_umbra_summary *summaries;  /* per tile */
+    umb_umbra_summary *groups;     /* per UMB_TILE x UMB_TILE tiles */
+    uint64_t *live;                /* per tile: pixels that rays go through */
+    bool *drawn;                   /* per tile */
+    bool *stale;                   /* per group: its summary is behind */
+    float (*spans)[2];             /* per tile row and group column: ua, ub of the cell in all slices there */
+    size_t bytes;                  /* of the one block behind the arrays */
+} umb_ray_map;
+
+typedef enum umb_ray_kind { UMB_RAY_SLAB, UMB_RAY_NEAR, UMB_RAY_FAR } umb_ray_kind;
+
+/* Lay out and empty a map. outer: of the squares. UMB_ERROR_MEMORY leaves nothing behind. A map that was set up before
+ * with the same sizes keeps its memory. */
+umb_result umb_ray_map_begin(umb_ray_map *map, const umb_allocator *a, const umb_ray_frame *frame,
+                             umb_ray_kind kind, double outer, uint32_t resolution, uint32_t umbrae);
+void umb_ray_map_free(umb_ray_map *map, const umb_allocator *a);
+
+/* A point in a frame. */
+typedef struct umb_ray_point {
+    double u, v, z;
+} umb_ray_point;
+
+umb_ray_point umb_ray_frame_point(const umb_ray_frame *f, const double p[3]);
+
+/* What is asked about: the hull of points, as a frame sees it. The outline holds their hull in (u, v), in order. */
+#define UMB_RAY_POINTS 64
+#define UMB_RAY_OUTLINE (UMB_RAY_POINTS + 2)
+typedef struct umb_ray_shape {
+    umb_ray_point outline[UMB_RAY_OUTLINE];
+    uint32_t count;
+    double z0, z1; /* lowest and highest */
+    double u_min, u_max;
+} umb_ray_shape;
+
+/* Of at most UMB_RAY_POINTS points; what lies behind the cell is cut off. False: nothing is left. */
+bool umb_ray_shape_make(const umb_ray_frame *f, const umb_ray_point *points, uint32_t count, umb_ray_shape *out);
+
+/* True if every line of the map that meets the shape is blocked before it. */
+bool umb_ray_map_hides(umb_ray_map *map, const umb_umbra_kernels *kernels, const umb_ray_shape *shape);
+
+/* An occluder in a frame. Chains run through its vertices; see umb_umbra. */
+typedef struct umb_ray_blocker {
+    umb_ray_point vertices[UMB_UMBRA_VERTICES];
+    uint32_t count;
+    bool convex;  /* any chain through the vertices lies in what blocks */
+    bool floor;   /* what is lowest of it stands on the ground: nothing passes below */
+    /* Not convex: the border of a disk of triangles, in order, comes first; then its inner vertices. */
+    uint32_t ring;
+    const uint8_t (*inner_edges)[2];
+    uint32_t inner_edge_count;
+    bool on_floor[UMB_UMBRA_VERTICES]; /* the vertex lies on the ground or below */
+} umb_ray_blocker;
+
+/* Draw it. half: keep tops alone, and draw nothing that does not stand on the ground. */
+void umb_ray_map_block(umb_ray_map *map, const umb_umbra_kernels *kernels, const umb_ray_blocker *b, bool half);
+
+/* True if everything at height z_min to z_max that is at least `gap` in front of the cell is hidden. */
+bool umb_ray_map_closed(umb_ray_map *map, double z_min, double z_max, double gap);
+
+#endif

@@ -1,0 +1,397 @@
+/* The walk: nearest first, everything is asked about once, and what is not hidden hides what comes later. */
+#include <math.h>
+#include <string.h>
+
+#include "base/sort.h"
+#include "geometry/transform.h"
+#include "region_state.h"
+
+/* ---- the queue: a heap of keys, each with what it is for ---------------------------------------- */
+
+/* By distance; at equal ones nodes, then occluders, then objects; then by number. */
+static uint64_t order_of(float key, uint32_t ref)
+{
+    uint32_t kind = ref & UMB_REF_KIND;
+    uint32_t rank = kind == UMB_REF_NODE ? 0 : kind == UMB_REF_OCCLUDER ? 1 : 2;
+    return (uint64_t)umb_sort_float(key) << 32 | (uint64_t)rank << 30 | (ref & UMB_REF_NUMBER);
+}
+
+static float key_of(uint64_t order)
+{
+    uint32_t bits = (uint32_t)(order >> 32);
+    bits = (bits & 0x80000000u) != 0 ? bits & 0x7FFFFFFFu : ~bits;
+    float key;
+    memcpy(&key, &bits, sizeof key);
+    return key;
+}
+
+static umb_result push(umb_region *r, uint64_t order)
+{
+    if (!umb_memory_reserve(&r->allocator, (void **)&r->queue, &r->queue_capacity, r->queue_count + 1,
+                            sizeof *r->queue)) {
+        return UMB_ERROR_MEMORY;
+    }
+    size_t i = r->queue_count++;
+    for (; i > 0 && r->queue[(i - 1) / 2] > order; i = (i - 1) / 2) {
+        r->queue[i] = r->queue[(i - 1) / 2];
+    }
+    r->queue[i] = order;
+    return UMB_OK;
+}
+
+static uint64_t pop(umb_region *r)
+{
+    uint64_t first = r->queue[0], last = r->queue[--r->queue_count];
+    size_t n = r->queue_count, i = 0;
+    for (size_t k = 1; k < n; k = 2 * i + 1) {
+        k += k + 1 < n && r->queue[k + 1] < r->queue[k] ? 1 : 0;
+        if (r->queue[k] >= last) {
+            break;
+        }
+        r->queue[i] = r->queue[k];
+        i = k;
+    }
+    r->queue[i] = last;
+    return first;
+}
+
+/* ---- frames and maps ----------------------------------------------------------------------------- */
+
+static void set_frames(umb_region *r)
+{
+    const umb_region_query *q = &r->query;
+    uint32_t up = q->up == UMB_UP_Y ? 1 : q->up == UMB_UP_Z ? 2 : 0;
+    uint32_t a = (up + 1) % 3, b = (up + 2) % 3;
+    /* A coordinate less the centre is rounded once, by half a unit of at most twice the reach; points where an occluder
+       is cut, three times more. */
+    double error = 0x1p-49 * r->reach;
+    for (int k = 0; k < 4; ++k) {
+        umb_ray_frame *f = &r->frames[k];
+        *f = (umb_ray_frame){.axis_u = k < 2 ? a : b, .axis_v = k < 2 ? b : a, .axis_z = up,
+                             .sign = (k & 1) != 0 ? -1.0 : 1.0, .error = error};
+        for (int i = 0; i < 3; ++i) {
+            f->centre[i] = 0.5 * (q->min[i] + q->max[i]);
+        }
+        f->hu = fmax(q->max[f->axis_u] - f->centre[f->axis_u], f->centre[f->axis_u] - q->min[f->axis_u]) + error;
+        f->hv = fmax(q->max[f->axis_v] - f->centre[f->axis_v], f->centre[f->axis_v] - q->min[f->axis_v]) + error;
+        f->z0 = q->min[up] - f->centre[up] - error;
+        f->z1 = q->max[up] - f->centre[up] + error;
+    }
+}
+
+static umb_result begin_maps(umb_region *r)
+{
+    const umb_region_query *q = &r->query;
+    r->map_count = q->outer != 0.0 ? 8 : 4;
+    for (uint32_t k = 0; k < r->map_count; ++k) {
+        umb_ray_kind kind = q->outer == 0.0 ? UMB_RAY_SLAB : k < 4 ? UMB_RAY_NEAR : UMB_RAY_FAR;
+        umb_result result = umb_ray_map_begin(&r->maps[k], &r->allocator, &r->frames[k % 4], kind, q->outer,
+                                              q->resolution, q->umbrae);
+        if (result != UMB_OK) {
+            return result;
+        }
+    }
+    return UMB_OK;
+}
+
+/* ---- asking ------------------------------------------------------------------------------------- */
+
+/* True if nothing of the hull of points (in the scene's coordinates) can be seen. */
+static bool points_hidden(umb_region *r, const double (*points)[3], uint32_t count)
+{
+    umb_ray_point p[UMB_RAY_POINTS];
+    umb_ray_shape shape;
+    for (int k = 0; k < 4; ++k) {
+        const umb_ray_frame *f = &r->frames[k];
+        for (uint32_t i = 0; i < count; ++i) {
+            p[i] = umb_ray_frame_point(f, points[i]);
+        }
+        if (!umb_ray_shape_make(f, p, count, &shape)) {
+            continue;
+        }
+        for (uint32_t m = (uint32_t)k; m < r->map_count; m += 4) {
+            if (!umb_ray_map_hides(&r->maps[m], r->kernels, &shape)) {
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+/* Four corners that have all the coordinates of a box. */
+static bool box_hidden(umb_region *r, const umb_aabb *box)
+{
+    uint32_t up = r->frames[0].axis_z, a = r->frames[0].axis_u, b = r->frames[0].axis_v;
+    double p[4][3];
+    for (int i = 0; i < 4; ++i) {
+        p[i][a] = i == 0 || i == 3 ? box->min[a] : box->max[a];
+        p[i][b] = i < 2 ? box->min[b] : box->max[b];
+        p[i][up] = (i & 1) != 0 ? box->min[up] : box->max[up];
+    }
+    r->answer.stats.queries += 1;
+    return points_hidden(r, (const double(*)[3])p, 4);
+}
+
+/* The box, in the world, of a part's box under a transform whose world vertices are rounded. */
+static umb_aabb part_box(const umb_object *o, const umb_aabb *box)
+{
+    umb_aabb out = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+    for (int c = 0; c < 8; ++c) {
+        float p[3], w[3];
+        for (int k = 0; k < 3; ++k) {
+            p[k] = (c >> k & 1) != 0 ? box->max[k] : box->min[k];
+        }
+        umb_transform_point(&o->transform, p, w);
+        for (int k = 0; k < 3; ++k) {
+            out.min[k] = w[k] < out.min[k] ? w[k] : out.min[k];
+            out.max[k] = w[k] > out.max[k] ? w[k] : out.max[k];
+        }
+    }
+    return out;
+}
+
+static bool parts_hidden(umb_region *r, const umb_object *o)
+{
+    const umb_mesh *m = o->mesh;
+    for (uint32_t i = 0; i < m->part_count;) {
+        const umb_part *part = &m->parts[i];
+        umb_aabb box = o->identity ? part->box : part_box(o, &part->box);
+        if (box_hidden(r, &box)) {
+            i = part->skip;
+        } else if (part->skip == i + 1) {
+            return false;
+        } else {
+            i += 1;
+        }
+    }
+    return true;
+}
+
+static bool object_hidden(umb_region *r, const umb_object *o)
+{
+    if (box_hidden(r, &o->bounds)) {
+        return true;
+    }
+    if (!o->refine) {
+        return false;
+    }
+    const umb_mesh *m = o->mesh;
+    if (m->position_count > UMB_RAY_POINTS) {
+        return parts_hidden(r, o);
+    }
+    double p[UMB_RAY_POINTS][3];
+    for (uint32_t i = 0; i < m->position_count; ++i) {
+        float w[3];
+        if (o->identity) {
+            memcpy(w, m->positions[i], sizeof w);
+        } else {
+            umb_transform_point(&o->transform, m->positions[i], w);
+        }
+        for (int k = 0; k < 3; ++k) {
+            p[i][k] = w[k];
+        }
+    }
+    return points_hidden(r, (const double(*)[3])p, m->position_count);
+}
+
+/* ---- blocking ------------------------------------------------------------------------------------ */
+
+static void add_point(const umb_region *r, umb_ray_blocker *b, umb_ray_point p, bool on_floor)
+{
+    (void)r;
+    if (b->count < UMB_UMBRA_VERTICES) {
+        b->on_floor[b->count] = on_floor;
+        b->vertices[b->count++] = p;
+    }
+}
+
+/* What of a convex body lies in front of the cell: vertices, and where its edges enter. */
+static void cut_convex(const umb_region *r, const umb_ray_frame *f, const umb_piece *piece,
+                       const umb_ray_point *p, const bool *on_floor, umb_ray_blocker *b)
+{
+    double most = f->hu;
+    for (uint32_t i = 0; i < piece->count; ++i) {
+        most = fmax(most, fabs(p[i].u));
+    }
+    double least = f->hu * (1.0 + 0x1p-16) + 0x1p-14 * most;
+    for (uint32_t i = 0; i < piece->count; ++i) {
+        if (p[i].u >= least) {
+            add_point(r, b, p[i], on_floor[i]);
+        }
+    }
+    for (uint32_t i = 0; i < piece->edge_count; ++i) {
+        umb_ray_point a = p[piece->edges[i][0]], z = p[piece->edges[i][1]];
+        if ((a.u >= least) != (z.u >= least)) {
+            double part = (least - a.u) / (z.u - a.u);
+            umb_ray_point at = {least, a.v + part * (z.v - a.v), a.z + part * (z.z - a.z)};
+            add_point(r, b, at, on_floor[piece->edges[i][0]] && on_floor[piece->edges[i][1]]);
+        }
+    }
+}
+
+static void block_frame(umb_region *r, int k, const umb_piece *piece)
+{
+    const umb_ray_frame *f = &r->frames[k];
+    umb_ray_point p[UMB_UMBRA_VERTICES];
+    bool on_floor[UMB_UMBRA_VERTICES];
+    double most = -INFINITY;
+    umb_ray_blocker b = {.convex = piece->convex, .floor = true};
+    for (uint32_t i = 0; i < piece->count; ++i) {
+        p[i] = umb_ray_frame_point(f, piece->points[i]);
+        on_floor[i] = piece->points[i][f->axis_z] <= r->floor;
+        most = fmax(most, p[i].u);
+    }
+    if (!(most > f->hu)) {
+        return;
+    }
+    if (piece->convex) {
+        cut_convex(r, f, piece, p, on_floor, &b);
+    } else {
+        memcpy(b.vertices, p, piece->count * sizeof *p);
+        memcpy(b.on_floor, on_floor, piece->count * sizeof *on_floor);
+        b.count = piece->count;
+        b.ring = piece->ring;
+        b.inner_edges = piece->edges;
+        b.inner_edge_count = piece->edge_count;
+    }
+    for (uint32_t m = (uint32_t)k; m < r->map_count && b.count >= 2; m += 4) {
+        umb_ray_map_block(&r->maps[m], r->kernels, &b, r->query.half_umbra);
+    }
+}
+
+static void block_piece(void *user, const umb_piece *piece)
+{
+    umb_region *r = user;
+    r->answer.stats.patches += 1;
+    for (int k = 0; k < 4; ++k) {
+        block_frame(r, k, piece);
+    }
+}
+
+/* Square of the distance between a box and the cell. */
+static double gap_squared(const umb_region_query *q, const umb_aabb *b)
+{
+    double sum = 0.0;
+    for (int k = 0; k < 3; ++k) {
+        double gap = fmax(0.0, fmax(q->min[k] - b->max[k], b->min[k] - q->max[k]));
+        sum += gap * gap;
+    }
+    return sum;
+}
+
+static umb_result block(umb_region *r, const umb_occluder *o)
+{
+    double least = 4.0 * r->query.near_depth * (1.0 + 0x1p-40);
+    if (gap_squared(&r->query, &o->bounds) < least * least) {
+        return UMB_OK;
+    }
+    r->answer.stats.occluders += 1;
+    return umb_pieces_cut(&r->pieces, o);
+}
+
+/* ---- the walk ------------------------------------------------------------------------------------ */
+
+/* How far a box is from the cell's square, along the farther of the two axes. */
+static float gap_of(const umb_region *r, const umb_aabb *b)
+{
+    double gap = 0.0;
+    for (int i = 0; i < 2; ++i) {
+        uint32_t k = i == 0 ? r->frames[0].axis_u : r->frames[0].axis_v;
+        gap = fmax(gap, fmax(r->query.min[k] - b->max[k], b->min[k] - r->query.max[k]));
+    }
+    return (float)gap;
+}
+
+static umb_result push_children(umb_region *r, const umb_node *n)
+{
+    r->answer.stats.nodes += 1;
+    for (uint32_t s = 0; s < n->count; ++s) {
+        umb_aabb box;
+        for (int k = 0; k < 3; ++k) {
+            box.min[k] = n->min[k][s];
+            box.max[k] = n->max[k][s];
+        }
+        umb_result result = push(r, order_of(gap_of(r, &box), n->ref[s]));
+        if (result != UMB_OK) {
+            return result;
+        }
+    }
+    return UMB_OK;
+}
+
+static umb_aabb node_box(const umb_node *n)
+{
+    umb_aabb box;
+    for (int k = 0; k < 3; ++k) {
+        box.min[k] = n->min[k][0];
+        box.max[k] = n->max[k][0];
+        for (uint32_t s = 1; s < n->count; ++s) {
+            box.min[k] = n->min[k][s] < box.min[k] ? n->min[k][s] : box.min[k];
+            box.max[k] = n->max[k][s] > box.max[k] ? n->max[k][s] : box.max[k];
+        }
+    }
+    return box;
+}
+
+static umb_result visit(umb_region *r, const umb_tree *tree, const umb_committed *c, uint64_t order)
+{
+    uint32_t rank = (uint32_t)(order >> 30) & 3u, number = (uint32_t)order & UMB_REF_NUMBER;
+    if (rank == 0) {
+        const umb_node *n = umb_tree_node(tree, number);
+        umb_aabb box = node_box(n);
+        return box_hidden(r, &box) ? UMB_OK : push_children(r, n);
+    }
+    if (rank == 1) {
+        const umb_occluder *o = &c->occluders[number];
+        return box_hidden(r, &o->bounds) ? UMB_OK : block(r, o);
+    }
+    const umb_object *o = &c->objects[number];
+    if (object_hidden(r, o)) {
+        return UMB_OK;
+    }
+    r->pvs[r->answer.pvs_count++] = number;
+    return o->occluder != UMB_NONE ? block(r, &c->occluders[o->occluder]) : UMB_OK;
+}
+
+/* Nothing that far out can be seen any more, in any direction. */
+static bool all_closed(umb_region *r, const umb_tree *tree, float gap)
+{
+    uint32_t up = r->frames[0].axis_z;
+    for (uint32_t m = 0; m < r->map_count; ++m) {
+        if (!umb_ray_map_closed(&r->maps[m], tree->bounds.min[up], tree->bounds.max[up], gap)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+umb_result umb_region_walk(umb_region *r)
+{
+    const umb_tree *tree = umb_index_tree(r->index);
+    const umb_committed *c = umb_scene_committed(umb_index_scene(r->index));
+    set_frames(r);
+    uint32_t up = r->frames[0].axis_z;
+    r->floor = fmin(r->query.min[up], tree->node_count > 0 ? tree->bounds.min[up] : r->query.min[up]);
+    r->pieces.corners = (const double(*)[3])r->corners;
+    r->pieces.reach = r->reach;
+    r->pieces.emit = block_piece;
+    r->pieces.user = r;
+    r->queue_count = 0;
+    umb_result result = begin_maps(r);
+    for (uint32_t k = 0; k < (tree->flat ? tree->node_count : tree->node_count > 0 ? 1u : 0u) && result == UMB_OK; ++k) {
+        result = push_children(r, &tree->nodes[k]);
+    }
+    float checked = 0.0f;
+    while (result == UMB_OK && r->queue_count > 0) {
+        uint64_t order = pop(r);
+        float gap = key_of(order);
+        if (gap > 1.05f * checked) {
+            checked = gap;
+            if (all_closed(r, tree, gap)) {
+                break;
+            }
+        }
+        result = visit(r, tree, c, order);
+    }
+    return result;
+}

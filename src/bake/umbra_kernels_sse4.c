@@ -1,0 +1,8 @@
+/* umbra_kernels.inl for SSE4. */
+#include "umbra_kernels.h"
+
+#if defined(UMB_HAVE_SSE4)
+#define KERNELS umb_umbra_kernels_sse4
+#define ISA UMB_ISA_SSE4
+#include "umbra_kernels.inl"
+#endif
