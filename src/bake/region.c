@@ -202,16 +202,17 @@ umb_result umb_region_solve(umb_region *region, const umb_region_query *query, u
 
 umb_result umb_region_refine(umb_region *region, uint32_t effort, umb_region_answer *out)
 {
-    (void)effort;
     memset(out, 0, sizeof *out);
     if (!region->solved) {
         return umb_region_fail(region, UMB_ERROR_STATE, "there is no solved cell to refine");
     }
     umb_region_answer *a = &region->answer;
-    memcpy(region->refined, a->pvs, a->pvs_count * sizeof *a->pvs);
+    if (umb_region_decide(region, effort) != UMB_OK) {
+        return umb_region_fail(region, UMB_ERROR_MEMORY, "no memory to refine %u objects", a->pvs_count);
+    }
     a->refined = region->refined;
-    a->refined_count = a->stats.undecided = a->pvs_count;
-    a->stats.refined_triangles = a->stats.pvs_triangles;
+    a->stats.refined_triangles = sum_triangles(umb_scene_committed(umb_index_scene(region->index)), a->refined,
+                                               a->refined_count);
     *out = *a;
     return UMB_OK;
 }

@@ -39,6 +39,9 @@ struct umb_region {
 /* Find the set of the cell by occlusion maps. */
 umb_result umb_region_walk(umb_region *region);
 
+/* Decide about the objects of the set one by one; fills in refined and undecided. */
+umb_result umb_region_decide(umb_region *region, uint32_t effort);
+
 /* Fill in region->error and return code. */
 umb_result umb_region_fail(const umb_region *region, umb_result code, const char *format, ...)
     __attribute__((format(printf, 3, 4)));

@@ -286,7 +286,10 @@ static umb_result block(umb_region *r, const umb_occluder *o)
         return UMB_OK;
     }
     r->answer.stats.occluders += 1;
-    return umb_pieces_cut(&r->pieces, o);
+    bool added;
+    umb_result result = umb_solids_add(&r->solids, o, (uint32_t)(o - umb_scene_committed(umb_index_scene(r->index))->occluders),
+                                       (const double(*)[3])r->corners, &added);
+    return result == UMB_OK ? umb_pieces_cut(&r->pieces, o) : result;
 }
 
 /* ---- the walk ------------------------------------------------------------------------------------ */
