@@ -245,9 +245,9 @@ static inline __attribute__((always_inline)) void fetch(const walk *w, uint32_t 
             __builtin_prefetch(p + i);
         }
     } else if ((ref & UMB_REF_KIND) == UMB_REF_OBJECT) {
-        const char *p = (const char *)&w->scene->objects[number];
-        __builtin_prefetch(p);
-        __builtin_prefetch(p + sizeof(umb_object) - 1);
+        const umb_object *o = &w->scene->objects[number];
+        __builtin_prefetch(o);
+        __builtin_prefetch((const char *)&o->transform - 1); /* the end of what comes first */
     }
 }
 
@@ -396,7 +396,7 @@ static void open_node(walk *w, uint32_t number, uint16_t planes)
 /* True if drawing an occluder is sure, or all but sure, to change nothing (Gummerus 5.2, redundancy): its box's image
  * is too small, or there is no open pixel left in it. Where every pixel is covered a drawing could still bring the
  * depth of a sub-tile nearer that it covers alone; that takes a large image. */
-static bool is_idle(walk *w, uint32_t occluder, const umb_waiting *item)
+static bool is_idle(walk *w, bool convex, const umb_waiting *item)
 {
     const umb_culler *c = w->culler;
     const umb_pixel_rect *r = &item->image.rect;
@@ -404,7 +404,7 @@ static bool is_idle(walk *w, uint32_t occluder, const umb_waiting *item)
         return false;
     }
     int side = r->x1 - r->x0 < r->y1 - r->y0 ? r->x1 - r->x0 : r->y1 - r->y0;
-    if (side < (w->scene->occluders[occluder].mesh->convex ? LEAST_PIXELS : LEAST_MESH_PIXELS)) {
+    if (side < (convex ? LEAST_PIXELS : LEAST_MESH_PIXELS)) {
         return true;
     }
     if (side >= DEPTH_PIXELS || w->drawn == 0) {
@@ -415,15 +415,16 @@ static bool is_idle(walk *w, uint32_t occluder, const umb_waiting *item)
     return c->ops->hidden(c->method, &pixels, NULL);
 }
 
-/* Draw an occluder, unless it is not worth it. */
-static void draw(walk *w, uint32_t occluder, const umb_waiting *item)
+/* Draw an occluder, unless it is not worth it. box: its own, if it is one that stands along the axes, else NULL. */
+static void draw(walk *w, uint32_t occluder, const umb_aabb *box, const umb_waiting *item)
 {
     const umb_culler *c = w->culler;
     if (c->ops == NULL || occluder == UMB_NONE ||
         (w->once != NULL && umb_once_has(w->once, w->once->occluders[occluder], UMB_ONCE_DRAWN))) {
         return;
     }
-    if (is_idle(w, occluder, item)) {
+    bool convex = box != NULL || w->scene->occluders[occluder].mesh->convex;
+    if (is_idle(w, convex, item)) {
         w->stats.idle += 1;
         return;
     }
@@ -431,9 +432,8 @@ static void draw(walk *w, uint32_t occluder, const umb_waiting *item)
         umb_once_set(w->once, &w->once->occluders[occluder], UMB_ONCE_DRAWN);
     }
     umb_past *past = &w->culler->past;
-    const umb_mesh *mesh = w->scene->occluders[occluder].mesh;
-    if (!umb_past_judges(past, !mesh->convex)) {
-        w->drawn += c->ops->occlude(c->method, occluder, &w->stats) != 0;
+    if (!umb_past_judges(past, !convex)) {
+        w->drawn += c->ops->occlude(c->method, occluder, box, &w->stats) != 0;
         return;
     }
     const umb_pixel_rect *rect = item->testable ? &item->image.rect : NULL;
@@ -447,9 +447,9 @@ static void draw(walk *w, uint32_t occluder, const umb_waiting *item)
         w->stats.over_budget += 1;
         break;
     case UMB_PAST_DRAW: {
-        uint32_t before = w->stats.occluders, tiles = c->ops->occlude(c->method, occluder, &w->stats);
+        uint32_t before = w->stats.occluders, tiles = c->ops->occlude(c->method, occluder, box, &w->stats);
         w->drawn += tiles != 0;
-        umb_past_drew(past, occluder, rect, tiles, !mesh->convex);
+        umb_past_drew(past, occluder, rect, tiles, !convex);
         if (w->scene->occluders[occluder].moves) {
             umb_past_unlist(past, occluder);
         }
@@ -561,8 +561,9 @@ static bool visit_object(walk *w, umb_waiting *item, const umb_heap_entry *entry
         posed = umb_movers_object(&w->culler->movers, umb_movers_find(&w->culler->movers, o->mover));
         o = &posed;
     }
+    const umb_aabb *box = o->box ? &o->bounds : NULL;
     if (umb_past_object_seen(&w->culler->past, item->ref & UMB_REF_NUMBER)) {
-        draw(w, o->occluder, item);
+        draw(w, o->occluder, box, item);
         report(w, item);
         return false;
     }
@@ -579,7 +580,7 @@ static bool visit_object(walk *w, umb_waiting *item, const umb_heap_entry *entry
         return false;
     }
     if (first) {
-        draw(w, o->occluder, item);
+        draw(w, o->occluder, box, item);
     }
     if (!can_wait || !(item->settled > umb_heap_key(entry))) { /* asking may have moved it either way */
         report(w, item);
@@ -618,7 +619,7 @@ static void run_queue(walk *w)
         } else if ((item->ref & UMB_REF_KIND) == UMB_REF_NODE) {
             open_node(w, item->ref & UMB_REF_NUMBER, item->planes);
         } else if ((item->ref & UMB_REF_KIND) == UMB_REF_OCCLUDER) {
-            draw(w, item->ref & UMB_REF_NUMBER, item);
+            draw(w, item->ref & UMB_REF_NUMBER, NULL, item);
         } else {
             waits = visit_object(w, item, &entry);
         }

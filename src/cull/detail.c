@@ -10,21 +10,14 @@ bool umb_detail_hidden(const umb_asker *a, const umb_image *image, const umb_out
     return a->ops->hidden(a->method, image, outline);
 }
 
-/* A box that stands along the axes is its own bounds. */
 umb_detail umb_detail_of(const umb_object *o)
 {
     const umb_mesh *mesh = o->mesh;
-    if (!o->refine || mesh->seen_count == 0) {
+    if (!o->refine || o->box || mesh->seen_count == 0) {
         return UMB_DETAIL_NONE;
     }
     bool body = mesh->convex && mesh->seen_count == mesh->triangle_count && o->occluder != UMB_NONE;
-    if (!body) {
-        return UMB_DETAIL_PARTS;
-    }
-    const float (*m)[4] = o->transform.m;
-    bool along = o->identity || (m[0][1] == 0.0f && m[0][2] == 0.0f && m[1][0] == 0.0f &&
-                                 m[1][2] == 0.0f && m[2][0] == 0.0f && m[2][1] == 0.0f);
-    return mesh->box && along ? UMB_DETAIL_NONE : UMB_DETAIL_BODY;
+    return body ? UMB_DETAIL_BODY : UMB_DETAIL_PARTS;
 }
 
 static void place_triangle(const umb_object *o, const uint32_t corner[3], float world[3][3])

@@ -100,8 +100,9 @@ typedef struct umb_method_ops {
     /* True if something of this nearness at a raster point would surely not be found hidden: a cheap first
        question, whose answer false says nothing. */
     bool (*open_at)(const void *state, double x, double y, double nearness);
-    /* How many tiles of the buffer it changed; 0: no later answer differs for it. */
-    uint32_t (*occlude)(void *state, uint32_t occluder, umb_cull_stats *stats);
+    /* box: NULL, or the box along the axes that the occluder is, to the bit. How many tiles of the buffer it
+       changed; 0: no later answer differs for it. */
+    uint32_t (*occlude)(void *state, uint32_t occluder, const umb_aabb *box, umb_cull_stats *stats);
     const umb_coverage *(*buffer)(const void *state);
     /* After prepare, for a walk beside which workers - 1 other threads are free: how many helpers this frame is
        worth. help may then be called once for each, at any time until finish or after it, while the thread of

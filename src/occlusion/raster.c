@@ -149,9 +149,23 @@ static uint32_t occlude_with_mesh(raster *r, uint32_t occluder, umb_cull_stats *
     return changed;
 }
 
-static uint32_t occlude(void *state, uint32_t occluder, umb_cull_stats *stats)
+static uint32_t draw_convex(raster *r, umb_cull_stats *stats)
+{
+    stats->occluders += 1;
+    stats->edges += r->convex.edge_count;
+    return r->kernels->fill_convex(&r->coverage, &r->map, &r->convex);
+}
+
+static uint32_t occlude(void *state, uint32_t occluder, const umb_aabb *box, umb_cull_stats *stats)
 {
     raster *r = state;
+    if (box != NULL) {
+        r->convex_of = UMB_NONE;
+        umb_convex_result found = r->kernels->find_box(&r->map, box, &r->convex);
+        if (found != UMB_CONVEX_OTHER) {
+            return found == UMB_CONVEX_READY ? draw_convex(r, stats) : 0;
+        }
+    }
     const umb_occluder *o = &r->scene->occluders[occluder];
     umb_silhouette *s = &r->scratch.silhouette;
     if (!is_body(o->mesh)) {
@@ -168,11 +182,10 @@ static uint32_t occlude(void *state, uint32_t occluder, umb_cull_stats *stats)
     if (found == UMB_CONVEX_NOTHING) {
         return 0;
     }
-    stats->occluders += 1;
     if (found == UMB_CONVEX_READY) {
-        stats->edges += r->convex.edge_count;
-        return r->kernels->fill_convex(&r->coverage, &r->map, &r->convex);
+        return draw_convex(r, stats);
     }
+    stats->occluders += 1;
     stats->edges += s->edge_count;
     umb_mesh_image_list(&r->scratch, &r->map, o);
     return r->kernels->fill_mesh(&r->coverage, &r->map, s, &r->scratch.fill);

@@ -54,6 +54,8 @@ typedef struct umb_raster_kernels {
     /* mesh->convex, at most UMB_CONVEX_TRIANGLES, placed, and no vertex is cut away. */
     umb_convex_result (*find_convex)(const umb_raster_map *map, const umb_occluder *occluder,
                                      const umb_silhouette *s, umb_convex *out);
+    /* The same for a box along the axes, whose corners are its vertices; fills in no outer lines, no upper planes. */
+    umb_convex_result (*find_box)(const umb_raster_map *map, const umb_aabb *box, umb_convex *out);
     /* Add what a convex occluder covers. How many tiles changed. */
     uint32_t (*fill_convex)(umb_coverage *c, const umb_raster_map *map, const umb_convex *convex);
     /* True if all of the body is hidden, as far as it lies in rect; find_convex made it. */

@@ -351,6 +351,8 @@ static umb_convex_result find_convex(const umb_raster_map *map, const umb_occlud
     return covers ? UMB_CONVEX_READY : UMB_CONVEX_NOTHING;
 }
 
+#include "box_image.inl"
+
 /* ---- convex shapes: filling ----------------------------------------------------------------- */
 
 /* Covered columns from left up to right, of eight rows. */
@@ -969,5 +971,5 @@ static uint32_t merge_list(umb_coverage *c, const umb_tile_list *list)
     return changed;
 }
 
-const umb_raster_kernels KERNELS = {ISA,         hides,        hides_rect, place,     find_convex,
-                                    fill_convex, hides_convex, fill_mesh,  list_mesh, merge_list};
+const umb_raster_kernels KERNELS = {ISA,      hides,       hides_rect,   place,     find_convex, find_box,
+                                    fill_convex, hides_convex, fill_mesh, list_mesh,   merge_list};

@@ -17,18 +17,20 @@ typedef struct umb_occluder {
                              else may look at it */
 } umb_occluder;
 
-/* An object as committed. */
+/* An object as committed. What a walk looks at comes first. */
 typedef struct umb_object {
     umb_aabb bounds;
     const umb_mesh *mesh; /* NULL without a shape. Its parts refine the bounds */
-    umb_transform transform;
     uint32_t occluder;    /* index of the occluder it owns, or UMB_NONE */
     uint32_t mover;       /* its number among those that move by themselves, or UMB_NONE. If it has one, bounds
                              are a volume that holds it for a time, and transform is out of date */
-    bool used;            /* the id is in use */
-    bool live;            /* in use and not UMB_OBJECT_IGNORED */
-    bool identity;
-    bool refine;          /* UMB_OBJECT_IS_SHAPE: the mesh's parts say where it is */
+    bool used : 1;        /* the id is in use */
+    bool live : 1;        /* in use and not UMB_OBJECT_IGNORED */
+    bool identity : 1;
+    bool refine : 1;      /* UMB_OBJECT_IS_SHAPE: the mesh's parts say where it is */
+    bool boxed : 1;       /* its shape is a box, all of which hides: its own occluder */
+    bool box : 1;         /* boxed, and it stands along the axes: it is its bounds, to the bit */
+    umb_transform transform;
 } umb_object;
 
 typedef struct umb_committed {

@@ -30,6 +30,19 @@ static umb_occluder make_welded(const umb_mesh *mesh)
     return o;
 }
 
+/* A transform that scales and moves along the axes alone rounds equal coordinates alike: the corners of a box are the
+ * corners of the box of its world vertices. */
+static bool is_box(const umb_object *o, const umb_placement *p)
+{
+    const float (*m)[4] = p->transform.m;
+    bool along = o->identity || (m[0][1] == 0.0f && m[0][2] == 0.0f && m[1][0] == 0.0f &&
+                                 m[1][2] == 0.0f && m[2][0] == 0.0f && m[2][1] == 0.0f);
+    for (int i = 0; i < 3; ++i) {
+        along = along && o->bounds.min[i] == p->block_bounds.min[i] && o->bounds.max[i] == p->block_bounds.max[i];
+    }
+    return o->boxed && o->mover == UMB_NONE && along;
+}
+
 static umb_object make_object(const umb_scene *scene, const umb_object_slot *slot, uint32_t occluder)
 {
     umb_object o = {.occluder = occluder, .mover = UMB_NONE};
@@ -42,6 +55,8 @@ static umb_object make_object(const umb_scene *scene, const umb_object_slot *slo
         o.live = (slot->flags & UMB_OBJECT_IGNORED) == 0;
         o.identity = slot->placement.identity;
         o.refine = o.mesh != NULL && (slot->flags & UMB_OBJECT_IS_SHAPE) != 0;
+        o.boxed = o.refine && occluder != UMB_NONE && o.mesh->box && o.mesh->seen_count == o.mesh->triangle_count;
+        o.box = is_box(&o, &slot->placement);
     }
     return o;
 }
@@ -231,6 +246,7 @@ static void commit_moved(umb_scene *scene)
         object->transform = p->transform;
         object->identity = p->identity;
         object->mover = slot->mover;
+        object->box = is_box(object, p);
         if (object->occluder != UMB_NONE) {
             umb_occluder *occluder = &scene->committed_occluders[object->occluder];
             occluder->transform = p->transform;
