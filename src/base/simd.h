@@ -355,6 +355,19 @@ UMB_INLINE float umb_fv_least(umb_fv v)
     return v[0];
 }
 
+UMB_INLINE int32_t umb_iv_least(umb_iv v)
+{
+#if UMB_LANES == 8
+    v = umb_iv_min(v, __builtin_shufflevector(v, v, 4, 5, 6, 7, 0, 1, 2, 3));
+    v = umb_iv_min(v, __builtin_shufflevector(v, v, 2, 3, 0, 1, 6, 7, 4, 5));
+    v = umb_iv_min(v, __builtin_shufflevector(v, v, 1, 0, 3, 2, 5, 4, 7, 6));
+#else
+    v = umb_iv_min(v, __builtin_shufflevector(v, v, 2, 3, 0, 1));
+    v = umb_iv_min(v, __builtin_shufflevector(v, v, 1, 0, 3, 2));
+#endif
+    return v[0];
+}
+
 UMB_INLINE double umb_dv_least(umb_dv v)
 {
     double least = v[0];

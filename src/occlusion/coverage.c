@@ -3,6 +3,12 @@
 #include <math.h>
 #include <string.h>
 
+/* Kernels look at 32 entries at a time. */
+static size_t coarse_bytes(size_t tiles)
+{
+    return (tiles + UMB_COARSE_SPARE) * sizeof(float);
+}
+
 bool umb_coverage_resize(umb_coverage *c, const umb_allocator *a, uint32_t width, uint32_t height)
 {
     uint32_t columns = (width + UMB_TILE_WIDTH - 1) / UMB_TILE_WIDTH;
@@ -10,10 +16,10 @@ bool umb_coverage_resize(umb_coverage *c, const umb_allocator *a, uint32_t width
     size_t need = (size_t)columns * rows;
     if (need > c->tile_capacity) {
         umb_tile *tiles = umb_memory_allocate(a, need * sizeof(umb_tile));
-        float *coarse = umb_memory_allocate(a, need * sizeof(float));
+        float *coarse = umb_memory_allocate(a, coarse_bytes(need));
         if (tiles == NULL || coarse == NULL) {
             umb_memory_free(a, tiles, need * sizeof(umb_tile));
-            umb_memory_free(a, coarse, need * sizeof(float));
+            umb_memory_free(a, coarse, coarse_bytes(need));
             return false;
         }
         umb_coverage_free(c, a);
@@ -31,7 +37,7 @@ bool umb_coverage_resize(umb_coverage *c, const umb_allocator *a, uint32_t width
 void umb_coverage_free(umb_coverage *c, const umb_allocator *a)
 {
     umb_memory_free(a, c->tiles, c->tile_capacity * sizeof(umb_tile));
-    umb_memory_free(a, c->coarse, c->tile_capacity * sizeof(float));
+    umb_memory_free(a, c->coarse, coarse_bytes(c->tile_capacity));
     memset(c, 0, sizeof *c);
 }
 
@@ -52,7 +58,7 @@ void umb_coverage_clear(umb_coverage *c)
             }
         }
     }
-    for (size_t t = 0; t < (size_t)c->columns * c->rows; ++t) {
+    for (size_t t = 0; t < (size_t)c->columns * c->rows + UMB_COARSE_SPARE; ++t) {
         c->coarse[t] = -INFINITY;
     }
 }

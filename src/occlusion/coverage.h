@@ -26,6 +26,9 @@ typedef struct umb_tile {
     float z[8];
 } umb_tile;
 
+/* So many entries behind the last of coarse may be read. */
+#define UMB_COARSE_SPARE 32
+
 typedef struct umb_coverage {
     umb_tile *tiles;
     float *coarse; /* per tile: the least z if every pixel is covered, else -infinity */

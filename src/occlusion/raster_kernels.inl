@@ -16,46 +16,115 @@ static const int32_t SUB_ROW[8] = {0, 0, 0, 0, 4, 4, 4, 4};
 static const uint32_t SUB_BYTE[8] = {0xFF, 0xFF00, 0xFF0000, 0xFF000000, 0xFF, 0xFF00, 0xFF0000, 0xFF000000};
 static const float SUB_X[8] = {0, 8, 16, 24, 0, 8, 16, 24};
 
-/* Rows r0..r1 and the columns of need, all within one tile, are covered by something nearer. */
-static inline bool tile_hides(const umb_tile *tile, int32_t r0, int32_t r1, uint32_t need, float nearness)
+/* Rows of a tile that are asked about, and its sub-tiles that have such rows. */
+typedef struct asked_rows {
+    umb_iv row[UMB_PARTS], sub_tile[UMB_PARTS];
+} asked_rows;
+
+UMB_INLINE asked_rows ask_rows(int32_t r0, int32_t r1)
 {
-    umb_iv open = umb_iv_set(0);
-    umb_iv columns = umb_iv_set((int32_t)need);
-    for (int at = 0; at < 8; at += UMB_LANES) {
-        umb_iv row = umb_iv_load(ROW + at);
-        umb_iv sub_row = umb_iv_load(SUB_ROW + at);
-        umb_iv asked = ((columns & umb_iv_load(SUB_BYTE + at)) != 0) & (sub_row + 3 >= r0) & (sub_row <= r1);
-        open |= columns & (row >= r0) & (row <= r1) & ~umb_iv_load(tile->mask + at);
+    asked_rows a;
+    for (int i = 0; i < UMB_PARTS; ++i) {
+        umb_iv row = umb_iv_load(ROW + i * UMB_LANES), sub_row = umb_iv_load(SUB_ROW + i * UMB_LANES);
+        a.row[i] = (row >= r0) & (row <= r1);
+        a.sub_tile[i] = (sub_row + 3 >= r0) & (sub_row <= r1);
+    }
+    return a;
+}
+
+/* Not zero in lanes of which something is open, or covered by what is farther than nearness: rows asked for, columns
+ * of need. */
+UMB_INLINE umb_iv open_lanes(const umb_tile *tile, const asked_rows *rows, uint32_t need, float nearness)
+{
+    umb_iv open = umb_iv_set(0), columns = umb_iv_set((int32_t)need);
+    for (int i = 0; i < UMB_PARTS; ++i) {
+        int at = i * UMB_LANES;
+        umb_iv asked = ((columns & umb_iv_load(SUB_BYTE + at)) != 0) & rows->sub_tile[i];
+        open |= columns & rows->row[i] & ~umb_iv_load(tile->mask + at);
         open |= asked & (umb_fv_load(tile->z + at) < nearness);
     }
+    return open;
+}
+
+/* Bits 0 .. n - 1, n of 0 to 32. */
+static inline uint32_t low_mask(int32_t n)
+{
+    return (uint32_t)((1ull << n) - 1);
+}
+
+/* A bit for each of eight tiles from here on that is not closed by something nearer. */
+UMB_INLINE uint32_t open_eight(const float *coarse, float nearness)
+{
+    uint32_t open = 0;
+    for (int i = 0; i < 8; i += UMB_LANES) {
+        open |= umb_iv_bits(umb_fv_load(coarse + i) < nearness) << i;
+    }
+    return open;
+}
+
+/* A rectangle in tiles: columns and rows of tiles, the pixel columns asked for in the first and the last. */
+typedef struct tile_rect {
+    uint32_t tx0, ty0, tx1, ty1;
+    uint32_t first, last;
+    int32_t r0, r1; /* rows in the first row of tiles from r0 on, in the last one up to r1 */
+} tile_rect;
+
+UMB_INLINE tile_rect find_tiles(uint32_t x0, uint32_t y0, uint32_t x1, uint32_t y1)
+{
+    return (tile_rect){.tx0 = x0 / UMB_TILE_WIDTH,
+                       .ty0 = y0 / UMB_TILE_HEIGHT,
+                       .tx1 = x1 / UMB_TILE_WIDTH,
+                       .ty1 = y1 / UMB_TILE_HEIGHT,
+                       .first = ~0u << (x0 % UMB_TILE_WIDTH),
+                       .last = ~0u >> (UMB_TILE_WIDTH - 1 - x1 % UMB_TILE_WIDTH),
+                       .r0 = (int32_t)(y0 % UMB_TILE_HEIGHT),
+                       .r1 = (int32_t)(y1 % UMB_TILE_HEIGHT)};
+}
+
+/* At most two tiles wide and high, as most are: all four are looked at, without a branch between them. What is there
+ * twice is asked twice, or nothing of it the second time. */
+UMB_INLINE bool small_hidden(const umb_coverage *c, const tile_rect *t, float nearness)
+{
+    int32_t wide = (int32_t)(t->tx1 - t->tx0), high = (int32_t)(t->ty1 - t->ty0);
+    uint32_t first = t->first & (t->last | (uint32_t)-wide);
+    asked_rows top = ask_rows(t->r0, t->r1 | 7 * high), low = ask_rows(t->r0 * (1 - high), t->r1);
+    const umb_tile *tile = c->tiles + (size_t)t->ty0 * c->columns + t->tx0;
+    const umb_tile *below = tile + (size_t)high * c->columns;
+    uint32_t last = t->last & (t->first | (uint32_t)-wide);
+    umb_iv open = open_lanes(tile, &top, first, nearness) | open_lanes(tile + wide, &top, last, nearness);
+    open |= open_lanes(below, &low, first, nearness) | open_lanes(below + wide, &low, last, nearness);
     return !umb_iv_any(open);
 }
 
-static inline bool rect_hidden(const umb_coverage *c, uint32_t x0, uint32_t y0, uint32_t x1, uint32_t y1,
-                               float nearness)
+static bool large_hidden(const umb_coverage *c, const tile_rect *t, float nearness)
 {
-    uint32_t tx0 = x0 / UMB_TILE_WIDTH;
-    uint32_t tx1 = x1 / UMB_TILE_WIDTH;
-    uint32_t ty0 = y0 / UMB_TILE_HEIGHT;
-    uint32_t ty1 = y1 / UMB_TILE_HEIGHT;
-    uint32_t first = ~0u << (x0 % UMB_TILE_WIDTH);
-    uint32_t last = ~0u >> (UMB_TILE_WIDTH - 1 - x1 % UMB_TILE_WIDTH);
-    for (uint32_t ty = ty0; ty <= ty1; ++ty) {
-        int32_t r0 = ty == ty0 ? (int32_t)(y0 % UMB_TILE_HEIGHT) : 0;
-        int32_t r1 = ty == ty1 ? (int32_t)(y1 % UMB_TILE_HEIGHT) : UMB_TILE_HEIGHT - 1;
+    for (uint32_t ty = t->ty0; ty <= t->ty1; ++ty) {
         const umb_tile *row = c->tiles + (size_t)ty * c->columns;
         const float *coarse = c->coarse + (size_t)ty * c->columns;
-        for (uint32_t tx = tx0; tx <= tx1; ++tx) {
-            if (coarse[tx] >= nearness) {
-                continue;
-            }
-            uint32_t need = (tx == tx0 ? first : ~0u) & (tx == tx1 ? last : ~0u);
-            if (!tile_hides(&row[tx], r0, r1, need, nearness)) {
-                return false;
+        asked_rows rows = ask_rows(ty == t->ty0 ? t->r0 : 0, ty == t->ty1 ? t->r1 : UMB_TILE_HEIGHT - 1);
+        for (uint32_t base = t->tx0; base <= t->tx1; base += 8) {
+            uint32_t count = t->tx1 - base + 1;
+            uint32_t open = open_eight(coarse + base, nearness) & low_mask(count < 8 ? (int32_t)count : 8);
+            for (; open != 0; open &= open - 1) {
+                uint32_t tx = base + (uint32_t)__builtin_ctz(open);
+                uint32_t need = (tx == t->tx0 ? t->first : ~0u) & (tx == t->tx1 ? t->last : ~0u);
+                if (umb_iv_any(open_lanes(&row[tx], &rows, need, nearness))) {
+                    return false;
+                }
             }
         }
     }
     return true;
+}
+
+UMB_INLINE bool rect_hidden(const umb_coverage *c, uint32_t x0, uint32_t y0, uint32_t x1, uint32_t y1,
+                            float nearness)
+{
+    tile_rect t = find_tiles(x0, y0, x1, y1);
+    if (((t.tx1 - t.tx0) | (t.ty1 - t.ty0)) <= 1) {
+        return small_hidden(c, &t, nearness);
+    }
+    return large_hidden(c, &t, nearness);
 }
 
 static bool hides_rect(const umb_coverage *c, umb_pixel_rect rect, float nearness)
@@ -364,30 +433,34 @@ typedef struct spans {
  * than it must, which is what the rounding upwards needs. */
 static inline bool find_spans(const umb_convex *v, const double *edge, int32_t first, spans *out)
 {
+    enum { HALVES = 2 * UMB_PARTS };
     umb_dv most = umb_dv_set(v->x_max), zero = umb_dv_set(0.0);
+    umb_dv left[HALVES], right[HALVES];
+    for (int h = 0; h < HALVES; ++h) {
+        left[h] = umb_dv_set(v->x_min);
+        right[h] = most;
+    }
+    for (uint32_t k = 0; k < v->left.count; ++k) {
+        double slope = v->left.slope[k], at = v->left.in_at[k];
+        const double *y = edge + (int)(slope > 0.0);
+        for (int h = 0; h < HALVES; ++h) {
+            left[h] = umb_dv_max(left[h], slope * umb_dv_load(y + h * UMB_WIDE) + at);
+        }
+    }
+    for (uint32_t k = 0; k < v->right.count; ++k) {
+        double slope = v->right.slope[k], at = v->right.in_at[k];
+        const double *y = edge + (int)!(slope > 0.0);
+        for (int h = 0; h < HALVES; ++h) {
+            right[h] = umb_dv_min(right[h], slope * umb_dv_load(y + h * UMB_WIDE) + at);
+        }
+    }
     double up = 1.0 - 0x1p-20;
     umb_iv any = umb_iv_set(0);
     for (int i = 0; i < UMB_PARTS; ++i) {
-        umb_dv left[2], right[2];
-        for (int half = 0; half < 2; ++half) {
-            const double *at = edge + i * UMB_LANES + half * UMB_WIDE;
-            umb_dv top = umb_dv_load(at), low = umb_dv_load(at + 1);
-            umb_dv l = umb_dv_set(v->x_min), r = most;
-            for (uint32_t k = 0; k < v->left.count; ++k) {
-                double slope = v->left.slope[k];
-                l = umb_dv_max(l, slope * (slope > 0.0 ? low : top) + v->left.in_at[k]);
-            }
-            for (uint32_t k = 0; k < v->right.count; ++k) {
-                double slope = v->right.slope[k];
-                r = umb_dv_min(r, slope * (slope > 0.0 ? top : low) + v->right.in_at[k]);
-            }
-            left[half] = umb_dv_min(l, most) + up;
-            right[half] = umb_dv_max(r, zero);
-        }
         umb_iv row = umb_iv_load(ROW + i * UMB_LANES) + first;
         umb_iv inside = (row >= (int32_t)v->row0) & (row <= (int32_t)v->row1);
-        out->left[i] = umb_dv_trunc(left[0], left[1]);
-        out->right[i] = umb_dv_trunc(right[0], right[1]) & inside;
+        out->left[i] = umb_dv_trunc(umb_dv_min(left[2 * i], most) + up, umb_dv_min(left[2 * i + 1], most) + up);
+        out->right[i] = umb_dv_trunc(umb_dv_max(right[2 * i], zero), umb_dv_max(right[2 * i + 1], zero)) & inside;
         any |= out->left[i] < out->right[i];
     }
     return umb_iv_any(any);
@@ -428,47 +501,151 @@ static inline umb_iv span_mask(umb_iv left, umb_iv right, int32_t x)
     return low_bits(to) & ~low_bits(from);
 }
 
-static uint32_t fill_convex(umb_coverage *c, const umb_raster_map *map, const umb_convex *v)
-{
+/* What a row of tiles is filled with. Tiles from full0 up to full1 are covered whole. */
+typedef struct convex_row {
+    const umb_convex *convex;
     row_planes planes;
     spans s;
+    int32_t tx0, tx1, full0, full1;
+} convex_row;
+
+/* Which tiles the spans meet, and which they fill; false if none. */
+static inline bool find_row_tiles(const umb_convex *v, const double *edge, int32_t first, convex_row *r)
+{
+    if (!find_spans(v, edge, first, &r->s)) {
+        return false;
+    }
+    umb_iv low = r->s.left[0], high = r->s.right[0], inner_low = low, inner_high = high;
+    for (int i = 0; i < UMB_PARTS; ++i) {
+        umb_iv beside = r->s.left[i] >= r->s.right[i];
+        low = umb_iv_min(low, r->s.left[i] | (beside & INT32_MAX));
+        high = umb_iv_max(high, r->s.right[i]);
+        inner_low = umb_iv_max(inner_low, r->s.left[i]);
+        inner_high = umb_iv_min(inner_high, r->s.right[i]);
+    }
+    r->tx0 = umb_iv_least(low) / UMB_TILE_WIDTH;
+    r->tx1 = (-umb_iv_least(-high) - 1) / UMB_TILE_WIDTH;
+    r->full0 = (-umb_iv_least(-inner_low) + UMB_TILE_WIDTH - 1) / UMB_TILE_WIDTH;
+    r->full1 = umb_iv_least(inner_high) / UMB_TILE_WIDTH;
+    return true;
+}
+
+/* The bound of the body in the sub-tiles of the tile at x. */
+UMB_INLINE umb_fv depth_of(const convex_row *r, uint32_t count, int part, float x)
+{
+    const umb_convex *v = r->convex;
+    umb_fv z = umb_fv_max(r->planes.at[0][part] + v->gx[0] * x, umb_fv_set(v->least[0]));
+    for (uint32_t k = 1; k < count; ++k) {
+        z = umb_fv_min(z, umb_fv_max(r->planes.at[k][part] + v->gx[k] * x, umb_fv_set(v->least[k])));
+    }
+    return z;
+}
+
+/* merge_parts() of a whole tile. */
+UMB_INLINE bool merge_whole(umb_coverage *c, size_t number, const convex_row *r, uint32_t count, float x)
+{
+    umb_tile *tile = &c->tiles[number];
+    umb_iv any = umb_iv_set(0);
+    umb_fv least = umb_fv_set(INFINITY);
+    for (int i = 0; i < UMB_PARTS; ++i) {
+        int at = i * UMB_LANES;
+        umb_fv z = depth_of(r, count, i, x), old_z = umb_fv_load(tile->z + at);
+        umb_iv fresh = (umb_iv_or_fours(~umb_iv_load(tile->mask + at)) & umb_iv_load(SUB_BYTE + at)) != 0;
+        umb_iv change = fresh | (z > old_z);
+        z = umb_fv_select(change, z, old_z);
+        any |= change;
+        least = umb_fv_min(least, z);
+        umb_iv_store(tile->mask + at, umb_iv_set(-1));
+        umb_fv_store(tile->z + at, z);
+    }
+    c->coarse[number] = umb_fv_least(least);
+    return umb_iv_any(any);
+}
+
+/* The bits from a up to b, both cut to 0 .. 32. */
+static inline uint32_t bits_between(int32_t a, int32_t b)
+{
+    a = a < 0 ? 0 : a > 32 ? 32 : a;
+    b = b < 0 ? 0 : b > 32 ? 32 : b;
+    return a < b ? (uint32_t)((1ull << b) - (1ull << a)) : 0;
+}
+
+/* A bit for each of the 32 tiles from here on that is not closed by something nearer. */
+static inline uint32_t open_tiles(const float *coarse, float most)
+{
+    uint32_t open = 0;
+    for (int i = 0; i < 32; i += UMB_LANES) {
+        open |= umb_iv_bits(umb_fv_load(coarse + i) < most) << i;
+    }
+    return open;
+}
+
+UMB_INLINE uint32_t fill_tiles(umb_coverage *c, size_t row, const convex_row *r, int32_t base, uint32_t open,
+                               uint32_t count)
+{
+    uint32_t changed = 0, whole = open & bits_between(r->full0 - base, r->full1 - base);
+    for (uint32_t left = open & ~whole; left != 0; left &= left - 1) {
+        int32_t tx = base + __builtin_ctz(left);
+        tile_part parts[UMB_PARTS];
+        for (int i = 0; i < UMB_PARTS; ++i) {
+            parts[i].mask = span_mask(r->s.left[i], r->s.right[i], tx * UMB_TILE_WIDTH);
+            parts[i].z = depth_of(r, count, i, (float)(tx * UMB_TILE_WIDTH));
+        }
+        changed += merge_parts(c, row + (size_t)tx, parts);
+    }
+    for (; whole != 0; whole &= whole - 1) {
+        int32_t tx = base + __builtin_ctz(whole);
+        changed += merge_whole(c, row + (size_t)tx, r, count, (float)(tx * UMB_TILE_WIDTH));
+    }
+    return changed;
+}
+
+/* A row of tiles, 32 at a time, of which something must be open. */
+static uint32_t fill_row(umb_coverage *c, const umb_raster_map *map, uint32_t ty, convex_row *r)
+{
+    const umb_convex *v = r->convex;
+    const double *edge = map->rows.edge + (size_t)ty * UMB_TILE_HEIGHT;
+    int32_t tx0 = (int32_t)v->x_min / UMB_TILE_WIDTH, tx1 = ((int32_t)v->x_max - 1) / UMB_TILE_WIDTH;
+    size_t row = (size_t)ty * c->columns;
     uint32_t changed = 0;
-    uint32_t tx0 = (uint32_t)v->x_min / UMB_TILE_WIDTH;
-    uint32_t tx1 = ((uint32_t)v->x_max - 1) / UMB_TILE_WIDTH;
-    for (uint32_t ty = v->row0 / UMB_TILE_HEIGHT; ty <= v->row1 / UMB_TILE_HEIGHT; ++ty) {
-        const double *edge = map->rows.edge + (size_t)ty * UMB_TILE_HEIGHT;
-        if (!find_spans(v, edge, (int32_t)(ty * UMB_TILE_HEIGHT), &s)) {
+    bool ready = false;
+    for (int32_t base = tx0 & ~31; base <= tx1; base += 32) {
+        uint32_t open = open_tiles(c->coarse + row + base, v->most) & bits_between(tx0 - base, tx1 + 1 - base);
+        if (open == 0) {
             continue;
         }
-        bool ready = false;
-        for (uint32_t tx = tx0; tx <= tx1; ++tx) {
-            size_t t = (size_t)ty * c->columns + tx;
-            if (c->coarse[t] >= v->most) {
-                continue;
+        if (!ready) {
+            if (!find_row_tiles(v, edge, (int32_t)(ty * UMB_TILE_HEIGHT), r)) {
+                return 0;
             }
-            tile_part parts[UMB_PARTS];
-            umb_iv any = umb_iv_set(0);
-            for (int i = 0; i < UMB_PARTS; ++i) {
-                parts[i].mask = span_mask(s.left[i], s.right[i], (int32_t)(tx * UMB_TILE_WIDTH));
-                any |= parts[i].mask;
-            }
-            if (!umb_iv_any(any)) {
-                continue;
-            }
-            if (!ready) {
-                place_planes(v, edge, false, &planes);
-                ready = true;
-            }
-            float x = (float)(tx * UMB_TILE_WIDTH);
-            for (int i = 0; i < UMB_PARTS; ++i) {
-                umb_fv z = umb_fv_set(INFINITY);
-                for (uint32_t k = 0; k < v->plane_count; ++k) {
-                    z = umb_fv_min(z, umb_fv_max(planes.at[k][i] + v->gx[k] * x, umb_fv_set(v->least[k])));
-                }
-                parts[i].z = z;
-            }
-            changed += merge_parts(c, t, parts);
+            place_planes(v, edge, false, &r->planes);
+            ready = true;
         }
+        open &= bits_between(r->tx0 - base, r->tx1 + 1 - base);
+        switch (v->plane_count) { /* three at most for a box: loops of known length */
+        case 1:
+            changed += fill_tiles(c, row, r, base, open, 1);
+            break;
+        case 2:
+            changed += fill_tiles(c, row, r, base, open, 2);
+            break;
+        case 3:
+            changed += fill_tiles(c, row, r, base, open, 3);
+            break;
+        default:
+            changed += fill_tiles(c, row, r, base, open, v->plane_count);
+        }
+    }
+    return changed;
+}
+
+static uint32_t fill_convex(umb_coverage *c, const umb_raster_map *map, const umb_convex *v)
+{
+    convex_row r;
+    uint32_t changed = 0;
+    r.convex = v;
+    for (uint32_t ty = v->row0 / UMB_TILE_HEIGHT; ty <= v->row1 / UMB_TILE_HEIGHT; ++ty) {
+        changed += fill_row(c, map, ty, &r);
     }
     return changed;
 }
