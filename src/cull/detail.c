@@ -12,12 +12,10 @@ bool umb_detail_hidden(const umb_asker *a, const umb_image *image, const umb_out
 
 umb_detail umb_detail_of(const umb_object *o)
 {
-    const umb_mesh *mesh = o->mesh;
-    if (!o->refine || o->box || mesh->seen_count == 0) {
-        return UMB_DETAIL_NONE;
+    if (o->body) {
+        return o->box ? UMB_DETAIL_NONE : UMB_DETAIL_BODY;
     }
-    bool body = mesh->convex && mesh->seen_count == mesh->triangle_count && o->occluder != UMB_NONE;
-    return body ? UMB_DETAIL_BODY : UMB_DETAIL_PARTS;
+    return o->refine && o->mesh->seen_count != 0 ? UMB_DETAIL_PARTS : UMB_DETAIL_NONE;
 }
 
 static void place_triangle(const umb_object *o, const uint32_t corner[3], float world[3][3])

@@ -32,23 +32,37 @@ void umb_heap_push(umb_heap *h, float key, uint32_t slot)
     h->entries[i] = item;
 }
 
+/* Of four, the first of the least; choices, not branches, which would be guessed wrong every other time. */
+static inline size_t least_of_four(const umb_heap_entry *e, size_t first)
+{
+    size_t a = first + (e[first + 1].order < e[first].order);
+    size_t b = first + 2 + (e[first + 3].order < e[first + 2].order);
+    return e[b].order < e[a].order ? b : a;
+}
+
+/* The way down is that of the least children, to the end, and what was last is put in from there upwards: it nearly
+ * always belongs close to the end. */
 umb_heap_entry umb_heap_pop(umb_heap *h)
 {
-    umb_heap_entry top = h->entries[0];
-    umb_heap_entry last = h->entries[--h->count];
-    size_t i = 0;
-    for (size_t first = 1; first < h->count; first = WAYS * i + 1) {
-        size_t end = first + WAYS < h->count ? first + WAYS : h->count;
-        size_t least = first;
-        for (size_t k = first + 1; k < end; ++k) {
-            least = h->entries[k].order < h->entries[least].order ? k : least;
-        }
-        if (h->entries[least].order >= last.order) {
-            break;
-        }
-        h->entries[i] = h->entries[least];
+    umb_heap_entry *e = h->entries, top = e[0], last = e[--h->count];
+    size_t i = 0, first = 1;
+    for (; first + WAYS <= h->count; first = WAYS * i + 1) {
+        size_t least = least_of_four(e, first);
+        e[i] = e[least];
         i = least;
     }
-    h->entries[i] = last;
+    if (first < h->count) {
+        size_t least = first;
+        for (size_t k = first + 1; k < h->count; ++k) {
+            least = e[k].order < e[least].order ? k : least;
+        }
+        e[i] = e[least];
+        i = least;
+    }
+    while (i > 0 && last.order < e[(i - 1) / WAYS].order) {
+        e[i] = e[(i - 1) / WAYS];
+        i = (i - 1) / WAYS;
+    }
+    e[i] = last;
     return top;
 }
