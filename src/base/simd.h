@@ -355,17 +355,25 @@ UMB_INLINE float umb_fv_least(umb_fv v)
     return v[0];
 }
 
-UMB_INLINE int32_t umb_iv_least(umb_iv v)
+/* The least lane of each of four. */
+UMB_INLINE void umb_iv_least_each(umb_iv a, umb_iv b, umb_iv c, umb_iv d, int32_t out[4])
 {
+    typedef int32_t four __attribute__((vector_size(16)));
 #if UMB_LANES == 8
-    v = umb_iv_min(v, __builtin_shufflevector(v, v, 4, 5, 6, 7, 0, 1, 2, 3));
-    v = umb_iv_min(v, __builtin_shufflevector(v, v, 2, 3, 0, 1, 6, 7, 4, 5));
-    v = umb_iv_min(v, __builtin_shufflevector(v, v, 1, 0, 3, 2, 5, 4, 7, 6));
+    umb_iv p = umb_iv_min(__builtin_shufflevector(a, b, 0, 8, 1, 9, 4, 12, 5, 13),
+                          __builtin_shufflevector(a, b, 2, 10, 3, 11, 6, 14, 7, 15));
+    umb_iv q = umb_iv_min(__builtin_shufflevector(c, d, 0, 8, 1, 9, 4, 12, 5, 13),
+                          __builtin_shufflevector(c, d, 2, 10, 3, 11, 6, 14, 7, 15));
+    p = umb_iv_min(__builtin_shufflevector(p, q, 0, 1, 8, 9, 4, 5, 12, 13),
+                   __builtin_shufflevector(p, q, 2, 3, 10, 11, 6, 7, 14, 15));
+    p = umb_iv_min(p, __builtin_shufflevector(p, p, 4, 5, 6, 7, 0, 1, 2, 3));
+    four least = __builtin_shufflevector(p, p, 0, 1, 2, 3);
 #else
-    v = umb_iv_min(v, __builtin_shufflevector(v, v, 2, 3, 0, 1));
-    v = umb_iv_min(v, __builtin_shufflevector(v, v, 1, 0, 3, 2));
+    umb_iv p = umb_iv_min(__builtin_shufflevector(a, b, 0, 4, 1, 5), __builtin_shufflevector(a, b, 2, 6, 3, 7));
+    umb_iv q = umb_iv_min(__builtin_shufflevector(c, d, 0, 4, 1, 5), __builtin_shufflevector(c, d, 2, 6, 3, 7));
+    four least = umb_iv_min(__builtin_shufflevector(p, q, 0, 1, 4, 5), __builtin_shufflevector(p, q, 2, 3, 6, 7));
 #endif
-    return v[0];
+    memcpy(out, &least, sizeof least);
 }
 
 UMB_INLINE double umb_dv_least(umb_dv v)

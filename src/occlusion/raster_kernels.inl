@@ -322,22 +322,23 @@ static uint32_t find_front(const umb_raster_map *map, const umb_occluder *o, con
     return front;
 }
 
-/* The silhouette: edges of which one side faces the eye. */
+/* The silhouette: edges of which one side faces the eye. They are listed first: which they are cannot be guessed. */
 static bool find_lines(umb_convex *out, const umb_raster_map *map, const umb_occluder *o,
                        const umb_silhouette *c, uint32_t front, umb_convex_frame *frame)
 {
     const umb_mesh *mesh = o->mesh;
-    int turn = o->mirrored ? -map->turn : map->turn;
-    out->left.count = out->right.count = out->edge_count = 0;
+    uint32_t turned = (o->mirrored ? -map->turn : map->turn) > 0 ? 0 : 1, count = 0;
+    uint8_t edges[UMB_CONVEX_EDGES];
     for (uint32_t i = 0; i < mesh->edge_count; ++i) {
         const umb_edge *e = &mesh->edges[i];
-        uint32_t one = front >> e->f0 & 1u;
-        if (one == (front >> e->f1 & 1u)) {
-            continue;
-        }
-        bool along = (one != 0) == (turn > 0);
-        uint32_t from = along ? e->v0 : e->v1;
-        uint32_t to = along ? e->v1 : e->v0;
+        edges[count] = (uint8_t)i;
+        count += (front >> e->f0 ^ front >> e->f1) & 1u;
+    }
+    out->left.count = out->right.count = out->edge_count = 0;
+    for (uint32_t i = 0; i < count; ++i) {
+        const umb_edge *e = &mesh->edges[edges[i]];
+        bool along = ((front >> e->f0 ^ turned) & 1u) != 0;
+        uint32_t from = along ? e->v0 : e->v1, to = along ? e->v1 : e->v0;
         if (!umb_convex_add_line(out, frame, c->x[from], c->y[from], c->x[to], c->y[to])) {
             return false;
         }
@@ -431,7 +432,7 @@ typedef struct spans {
 
 /* A row takes the worse of a line's x at its two ends. Columns are rounded inwards: in_at holds 2^-20 more
  * than it must, which is what the rounding upwards needs. */
-static inline bool find_spans(const umb_convex *v, const double *edge, int32_t first, spans *out)
+static inline void find_spans(const umb_convex *v, const double *edge, int32_t first, spans *out)
 {
     enum { HALVES = 2 * UMB_PARTS };
     umb_dv most = umb_dv_set(v->x_max), zero = umb_dv_set(0.0);
@@ -455,15 +456,12 @@ static inline bool find_spans(const umb_convex *v, const double *edge, int32_t f
         }
     }
     double up = 1.0 - 0x1p-20;
-    umb_iv any = umb_iv_set(0);
     for (int i = 0; i < UMB_PARTS; ++i) {
         umb_iv row = umb_iv_load(ROW + i * UMB_LANES) + first;
         umb_iv inside = (row >= (int32_t)v->row0) & (row <= (int32_t)v->row1);
         out->left[i] = umb_dv_trunc(umb_dv_min(left[2 * i], most) + up, umb_dv_min(left[2 * i + 1], most) + up);
         out->right[i] = umb_dv_trunc(umb_dv_max(right[2 * i], zero), umb_dv_max(right[2 * i + 1], zero)) & inside;
-        any |= out->left[i] < out->right[i];
     }
-    return umb_iv_any(any);
 }
 
 /* The n lowest bits, n of 0 to 32 in each lane; shifts by 32 have no meaning in C. */
@@ -482,12 +480,14 @@ typedef struct row_planes {
 static inline void place_planes(const umb_convex *v, const double *edge, bool upper, row_planes *out)
 {
     const float y[3] = {(float)edge[0], (float)edge[4], (float)edge[8]};
+    const float *bound = upper ? v->high : v->low;
     for (uint32_t k = 0; k < v->plane_count; ++k) {
+        const float *end = y + ((v->gy[k] < 0.0f) != upper);
+        float right = 8.0f * ((v->gx[k] < 0.0f) != upper);
         for (int i = 0; i < UMB_PARTS; ++i) {
-            const float *end = (v->gy[k] < 0.0f) != upper ? y + 1 : y;
             umb_fv row = umb_fv_fours(end[0], end[1], i);
-            umb_fv column = umb_fv_load(SUB_X + i * UMB_LANES) + ((v->gx[k] < 0.0f) != upper ? 8.0f : 0.0f);
-            out->at[k][i] = ((upper ? v->high[k] : v->low[k]) + v->gy[k] * row) + v->gx[k] * column;
+            umb_fv column = umb_fv_load(SUB_X + i * UMB_LANES) + right;
+            out->at[k][i] = (bound[k] + v->gy[k] * row) + v->gx[k] * column;
         }
     }
 }
@@ -501,55 +501,53 @@ static inline umb_iv span_mask(umb_iv left, umb_iv right, int32_t x)
     return low_bits(to) & ~low_bits(from);
 }
 
-/* What a row of tiles is filled with. Tiles from full0 up to full1 are covered whole. */
-typedef struct convex_row {
-    const umb_convex *convex;
-    row_planes planes;
+/* What a row of tiles is filled with: spans, of which the first and the last tile are met, and tiles from full0 up to
+ * full1 are covered whole. */
+typedef struct filled_row {
     spans s;
     int32_t tx0, tx1, full0, full1;
-} convex_row;
+} filled_row;
 
-/* Which tiles the spans meet, and which they fill; false if none. */
-static inline bool find_row_tiles(const umb_convex *v, const double *edge, int32_t first, convex_row *r)
+/* An empty row has tx1 before tx0. */
+static inline void find_row(const umb_convex *v, const double *edge, int32_t first, filled_row *r)
 {
-    if (!find_spans(v, edge, first, &r->s)) {
-        return false;
-    }
-    umb_iv low = r->s.left[0], high = r->s.right[0], inner_low = low, inner_high = high;
+    find_spans(v, edge, first, &r->s);
+    umb_iv low = umb_iv_set(INT32_MAX), high = low, inner_low = low, inner_high = low;
     for (int i = 0; i < UMB_PARTS; ++i) {
         umb_iv beside = r->s.left[i] >= r->s.right[i];
         low = umb_iv_min(low, r->s.left[i] | (beside & INT32_MAX));
-        high = umb_iv_max(high, r->s.right[i]);
-        inner_low = umb_iv_max(inner_low, r->s.left[i]);
+        high = umb_iv_min(high, -(r->s.right[i] & ~beside));
+        inner_low = umb_iv_min(inner_low, -r->s.left[i]);
         inner_high = umb_iv_min(inner_high, r->s.right[i]);
     }
-    r->tx0 = umb_iv_least(low) / UMB_TILE_WIDTH;
-    r->tx1 = (-umb_iv_least(-high) - 1) / UMB_TILE_WIDTH;
-    r->full0 = (-umb_iv_least(-inner_low) + UMB_TILE_WIDTH - 1) / UMB_TILE_WIDTH;
-    r->full1 = umb_iv_least(inner_high) / UMB_TILE_WIDTH;
-    return true;
+    int32_t ends[4];
+    umb_iv_least_each(low, high, inner_low, inner_high, ends);
+    r->tx0 = ends[0] >> 5;
+    r->tx1 = (-ends[1] - 1) >> 5;
+    r->full0 = -(ends[2] >> 5);
+    r->full1 = ends[3] >> 5;
 }
 
 /* The bound of the body in the sub-tiles of the tile at x. */
-UMB_INLINE umb_fv depth_of(const convex_row *r, uint32_t count, int part, float x)
+UMB_INLINE umb_fv depth_of(const umb_convex *v, const row_planes *p, uint32_t count, int part, float x)
 {
-    const umb_convex *v = r->convex;
-    umb_fv z = umb_fv_max(r->planes.at[0][part] + v->gx[0] * x, umb_fv_set(v->least[0]));
+    umb_fv z = umb_fv_max(p->at[0][part] + v->gx[0] * x, umb_fv_set(v->least[0]));
     for (uint32_t k = 1; k < count; ++k) {
-        z = umb_fv_min(z, umb_fv_max(r->planes.at[k][part] + v->gx[k] * x, umb_fv_set(v->least[k])));
+        z = umb_fv_min(z, umb_fv_max(p->at[k][part] + v->gx[k] * x, umb_fv_set(v->least[k])));
     }
     return z;
 }
 
 /* merge_parts() of a whole tile. */
-UMB_INLINE bool merge_whole(umb_coverage *c, size_t number, const convex_row *r, uint32_t count, float x)
+UMB_INLINE bool merge_whole(umb_coverage *c, size_t number, const umb_convex *v, const row_planes *p, uint32_t count,
+                            float x)
 {
     umb_tile *tile = &c->tiles[number];
     umb_iv any = umb_iv_set(0);
     umb_fv least = umb_fv_set(INFINITY);
     for (int i = 0; i < UMB_PARTS; ++i) {
         int at = i * UMB_LANES;
-        umb_fv z = depth_of(r, count, i, x), old_z = umb_fv_load(tile->z + at);
+        umb_fv z = depth_of(v, p, count, i, x), old_z = umb_fv_load(tile->z + at);
         umb_iv fresh = (umb_iv_or_fours(~umb_iv_load(tile->mask + at)) & umb_iv_load(SUB_BYTE + at)) != 0;
         umb_iv change = fresh | (z > old_z);
         z = umb_fv_select(change, z, old_z);
@@ -562,12 +560,10 @@ UMB_INLINE bool merge_whole(umb_coverage *c, size_t number, const convex_row *r,
     return umb_iv_any(any);
 }
 
-/* The bits from a up to b, both cut to 0 .. 32. */
+/* The bits from a up to b, of which b is at least 0 and a at most 32. */
 static inline uint32_t bits_between(int32_t a, int32_t b)
 {
-    a = a < 0 ? 0 : a > 32 ? 32 : a;
-    b = b < 0 ? 0 : b > 32 ? 32 : b;
-    return a < b ? (uint32_t)((1ull << b) - (1ull << a)) : 0;
+    return low_mask(b < 32 ? b : 32) & ~low_mask(a > 0 ? a : 0);
 }
 
 /* A bit for each of the 32 tiles from here on that is not closed by something nearer. */
@@ -580,72 +576,77 @@ static inline uint32_t open_tiles(const float *coarse, float most)
     return open;
 }
 
-UMB_INLINE uint32_t fill_tiles(umb_coverage *c, size_t row, const convex_row *r, int32_t base, uint32_t open,
-                               uint32_t count)
+/* 32 tiles from base on. */
+UMB_INLINE uint32_t fill_tiles(umb_coverage *c, size_t row, const umb_convex *v, const filled_row *r,
+                               const row_planes *p, int32_t base, uint32_t open, uint32_t count)
 {
-    uint32_t changed = 0, whole = open & bits_between(r->full0 - base, r->full1 - base);
+    uint32_t changed = 0, whole = 0;
+    if (r->full0 < r->full1 && r->full0 - base < 32 && r->full1 > base) {
+        whole = open & bits_between(r->full0 - base, r->full1 - base);
+    }
     for (uint32_t left = open & ~whole; left != 0; left &= left - 1) {
         int32_t tx = base + __builtin_ctz(left);
         tile_part parts[UMB_PARTS];
         for (int i = 0; i < UMB_PARTS; ++i) {
             parts[i].mask = span_mask(r->s.left[i], r->s.right[i], tx * UMB_TILE_WIDTH);
-            parts[i].z = depth_of(r, count, i, (float)(tx * UMB_TILE_WIDTH));
+            parts[i].z = depth_of(v, p, count, i, (float)(tx * UMB_TILE_WIDTH));
         }
         changed += merge_parts(c, row + (size_t)tx, parts);
     }
     for (; whole != 0; whole &= whole - 1) {
         int32_t tx = base + __builtin_ctz(whole);
-        changed += merge_whole(c, row + (size_t)tx, r, count, (float)(tx * UMB_TILE_WIDTH));
+        changed += merge_whole(c, row + (size_t)tx, v, p, count, (float)(tx * UMB_TILE_WIDTH));
     }
     return changed;
 }
 
-/* A row of tiles, 32 at a time, of which something must be open. */
-static uint32_t fill_row(umb_coverage *c, const umb_raster_map *map, uint32_t ty, convex_row *r)
+static inline uint32_t fill_row(umb_coverage *c, const double *edge, uint32_t ty, const umb_convex *v,
+                                const filled_row *r)
 {
-    const umb_convex *v = r->convex;
-    const double *edge = map->rows.edge + (size_t)ty * UMB_TILE_HEIGHT;
-    int32_t tx0 = (int32_t)v->x_min / UMB_TILE_WIDTH, tx1 = ((int32_t)v->x_max - 1) / UMB_TILE_WIDTH;
     size_t row = (size_t)ty * c->columns;
     uint32_t changed = 0;
-    bool ready = false;
-    for (int32_t base = tx0 & ~31; base <= tx1; base += 32) {
-        uint32_t open = open_tiles(c->coarse + row + base, v->most) & bits_between(tx0 - base, tx1 + 1 - base);
+    for (int32_t base = r->tx0 & ~31; base <= r->tx1; base += 32) {
+        uint32_t open = open_tiles(c->coarse + row + base, v->most) & bits_between(r->tx0 - base, r->tx1 + 1 - base);
         if (open == 0) {
             continue;
         }
-        if (!ready) {
-            if (!find_row_tiles(v, edge, (int32_t)(ty * UMB_TILE_HEIGHT), r)) {
-                return 0;
-            }
-            place_planes(v, edge, false, &r->planes);
-            ready = true;
-        }
-        open &= bits_between(r->tx0 - base, r->tx1 + 1 - base);
+        row_planes planes;
+        place_planes(v, edge, false, &planes);
         switch (v->plane_count) { /* three at most for a box: loops of known length */
         case 1:
-            changed += fill_tiles(c, row, r, base, open, 1);
+            changed += fill_tiles(c, row, v, r, &planes, base, open, 1);
             break;
         case 2:
-            changed += fill_tiles(c, row, r, base, open, 2);
+            changed += fill_tiles(c, row, v, r, &planes, base, open, 2);
             break;
         case 3:
-            changed += fill_tiles(c, row, r, base, open, 3);
+            changed += fill_tiles(c, row, v, r, &planes, base, open, 3);
             break;
         default:
-            changed += fill_tiles(c, row, r, base, open, v->plane_count);
+            changed += fill_tiles(c, row, v, r, &planes, base, open, v->plane_count);
         }
     }
     return changed;
 }
 
+/* So many rows of tiles are found before they are filled: how far they reach is known late, and nobody can guess it;
+ * together, none waits for another. */
+#define FOUND_ROWS 16
+
 static uint32_t fill_convex(umb_coverage *c, const umb_raster_map *map, const umb_convex *v)
 {
-    convex_row r;
-    uint32_t changed = 0;
-    r.convex = v;
-    for (uint32_t ty = v->row0 / UMB_TILE_HEIGHT; ty <= v->row1 / UMB_TILE_HEIGHT; ++ty) {
-        changed += fill_row(c, map, ty, &r);
+    filled_row rows[FOUND_ROWS];
+    uint32_t changed = 0, last = v->row1 / UMB_TILE_HEIGHT;
+    for (uint32_t from = v->row0 / UMB_TILE_HEIGHT; from <= last; from += FOUND_ROWS) {
+        uint32_t count = last - from < FOUND_ROWS ? last - from + 1 : FOUND_ROWS;
+        const double *edge = map->rows.edge + (size_t)from * UMB_TILE_HEIGHT;
+        for (uint32_t i = 0; i < count; ++i) {
+            uint32_t row = i * UMB_TILE_HEIGHT;
+            find_row(v, edge + row, (int32_t)(from * UMB_TILE_HEIGHT + row), &rows[i]);
+        }
+        for (uint32_t i = 0; i < count; ++i) {
+            changed += fill_row(c, edge + (size_t)i * UMB_TILE_HEIGHT, from + i, v, &rows[i]);
+        }
     }
     return changed;
 }
