@@ -137,6 +137,13 @@ static uint64_t check_buffer(const umb_raster_map *map, const umb_coverage *b, c
     return covered;
 }
 
+/* The box that an occluder is, as a walk has it; NULL for others. */
+static const umb_aabb *box_of(const umb_committed *c, uint32_t occluder)
+{
+    uint32_t owner = c->occluders[occluder].owner;
+    return owner != UMB_NONE && c->objects[owner].box ? &c->objects[owner].bounds : NULL;
+}
+
 static void test_invariant(void **state)
 {
     (void)state;
@@ -162,7 +169,7 @@ static void test_invariant(void **state)
                                                    &raster), UMB_OK);
         assert_int_equal(umb_raster_method.prepare(raster, &map, committed), UMB_OK);
         for (uint32_t k = 0; k < committed->occluder_count; ++k) {
-            (void)umb_raster_method.occlude(raster, k, &stats);
+            (void)umb_raster_method.occlude(raster, k, box_of(committed, k), &stats);
         }
         covered += check_buffer(&map, umb_raster_method.buffer(raster), micro.model, i);
         umb_raster_method.destroy(raster);
@@ -171,6 +178,114 @@ static void test_invariant(void **state)
     }
     printf("# %llu covered pixels checked\n", (unsigned long long)covered);
     assert_true(covered > scenes * 100u);
+}
+
+static double between(uint64_t *state, double low, double high)
+{
+    return low + (high - low) * unit(state);
+}
+
+/* Boxes along the axes: some mirrored, some flat, some around the eye. */
+static model *random_boxes(uint64_t *seed)
+{
+    float p[24];
+    uint32_t indices[36] = {0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5, 0, 1, 5, 0, 5, 4,
+                            2, 6, 7, 2, 7, 3, 0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6};
+    uint8_t flags[12] = {0};
+    for (int k = 0; k < 24; ++k) {
+        p[k] = (float)(k / 3 >> k % 3 & 1);
+    }
+    model *m = model_create();
+    uint32_t mesh = model_add_mesh(m, &(model_mesh){p, indices, flags, 8, 12});
+    uint32_t count = 1 + (uint32_t)(unit(seed) * 4);
+    for (uint32_t i = 0; i < count; ++i) {
+        umb_transform t = {{{0}}};
+        for (int axis = 0; axis < 3; ++axis) {
+            double size = between(seed, 0.05, 3.0), kind = unit(seed);
+            size = kind < 0.05 ? 0.0 : kind < 0.15 ? 1e-4 : kind < 0.25 ? 20.0 : size;
+            t.m[axis][axis] = (float)(unit(seed) < 0.2 ? -size : size);
+            t.m[axis][3] = (float)between(seed, -4.0, 4.0);
+        }
+        assert_true(model_add_object(m, "box", mesh, &t) != MODEL_NONE);
+    }
+    assert_true(model_finish(m, NULL, NULL));
+    return m;
+}
+
+/* The eye: anywhere, on the plane of a face, in a corner. */
+static umb_view random_view(const model *m, uint64_t *seed)
+{
+    const umb_aabb *b = &m->objects[0].bounds;
+    double eye[3], target[3], up[3] = {0, 0, 0}, kind = unit(seed);
+    umb_view view;
+    for (int axis = 0; axis < 3; ++axis) {
+        eye[axis] = between(seed, -9.0, 9.0);
+        target[axis] = 0.5 * ((double)b->min[axis] + b->max[axis]) + between(seed, -1.0, 1.0);
+        if (kind < 0.2 && unit(seed) < 0.6) {
+            eye[axis] = unit(seed) < 0.5 ? b->min[axis] : b->max[axis];
+        }
+    }
+    up[(int)(unit(seed) * 3)] = unit(seed) < 0.5 ? 1.0 : -1.0;
+    double near_depth = unit(seed) < 0.3 ? 1.0 : 1e-3;
+    assert_int_equal(umb_view_look_at(&view, eye, target, up, between(seed, 0.3, 2.0), 1.5, near_depth, 100.0), UMB_OK);
+    if (unit(seed) < 0.4) {
+        view.vertical[0] = view.vertical[1] = view.vertical[2] = 0.0; /* the screen's own raster */
+    }
+    if (unit(seed) < 0.3) {
+        for (int axis = 0; axis < 3; ++axis) {
+            view.right[axis] = -view.right[axis]; /* left-handed */
+        }
+    }
+    view.buffer_width = 70;
+    view.buffer_height = 45;
+    return view;
+}
+
+static uint64_t draw_all(void *raster, const umb_committed *c, bool boxes)
+{
+    umb_cull_stats stats = {0};
+    uint64_t as_boxes = 0;
+    for (uint32_t k = 0; k < c->occluder_count; ++k) {
+        as_boxes += box_of(c, k) != NULL;
+        (void)umb_raster_method.occlude(raster, k, boxes ? box_of(c, k) : NULL, &stats);
+    }
+    return as_boxes;
+}
+
+/* Boxes by themselves cover what they cover as meshes, within what errors move, and nothing that is open. */
+static void test_boxes(void **state)
+{
+    (void)state;
+    const char *size = getenv("UMBRAGE_TEST_SIZE");
+    uint32_t scenes = size != NULL && size[0] == 's' ? 400 : 4000;
+    uint64_t covered = 0, as_meshes = 0, boxes = 0;
+    for (uint32_t i = 0; i < scenes; ++i) {
+        uint64_t seed = i * 77u + 5u;
+        umb_error error;
+        model *m = random_boxes(&seed);
+        umb_view view = random_view(m, &seed);
+        umb_scene *scene = model_scene(m, false, (umb_tasks){0}, NULL, &error);
+        assert_non_null(scene);
+        const umb_committed *committed = umb_scene_committed(scene);
+        umb_raster_map map;
+        double rows[53];
+        umb_raster_map_prepare(&map, &view, i % 2 != 0 ? &m->bounds : NULL, rows);
+        umb_isa isa = umb_isa_available(isas[i % 4]) ? isas[i % 4] : UMB_ISA_SCALAR;
+        for (int by_box = 0; by_box < 2; ++by_box) {
+            void *raster;
+            assert_int_equal(umb_raster_method.create(umb_scene_allocator(scene), isa, &raster), UMB_OK);
+            assert_int_equal(umb_raster_method.prepare(raster, &map, committed), UMB_OK);
+            boxes += draw_all(raster, committed, by_box != 0);
+            *(by_box != 0 ? &covered : &as_meshes) += check_buffer(&map, umb_raster_method.buffer(raster), m, i);
+            umb_raster_method.destroy(raster);
+        }
+        umb_scene_destroy(scene);
+        model_free(m);
+    }
+    printf("# %llu boxes, %llu covered pixels checked, %llu as meshes\n", (unsigned long long)boxes,
+           (unsigned long long)covered, (unsigned long long)as_meshes);
+    assert_true(boxes > scenes && covered > scenes * 50u);
+    assert_true(covered > as_meshes - as_meshes / 100 && covered < as_meshes + as_meshes / 100);
 }
 
 /* A wall before the eye and, in the same shape, a triangle that the near depth cuts and whose image lies
@@ -262,6 +377,7 @@ static void test_plane_beyond_floats(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_invariant),
+                                       cmocka_unit_test(test_boxes),
                                        cmocka_unit_test(test_far_beside),
                                        cmocka_unit_test(test_plane_beyond_floats)};
     return cmocka_run_group_tests(tests, NULL, NULL);
