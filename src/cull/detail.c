@@ -12,7 +12,7 @@ bool umb_detail_hidden(const umb_asker *a, const umb_image *image, const umb_out
 
 umb_detail umb_detail_of(const umb_object *o)
 {
-    if (o->body) {
+    if (o->body && o->occluder != UMB_NONE) {
         return o->box ? UMB_DETAIL_NONE : UMB_DETAIL_BODY;
     }
     return o->refine && o->mesh->seen_count != 0 ? UMB_DETAIL_PARTS : UMB_DETAIL_NONE;

@@ -28,7 +28,8 @@ typedef struct umb_object {
     bool live : 1;        /* in use and not UMB_OBJECT_IGNORED */
     bool identity : 1;
     bool refine : 1;      /* UMB_OBJECT_IS_SHAPE: the mesh's parts say where it is */
-    bool body : 1;        /* refine, and its shape is a convex body, all of which hides: its own occluder */
+    bool body : 1;        /* refine, and its shape is a convex body, all of which blocks: what its occluder is, if it
+                             has one */
     bool boxed : 1;       /* body, and it is a box */
     bool box : 1;         /* boxed, and it stands along the axes: it is its bounds, to the bit */
     umb_transform transform;

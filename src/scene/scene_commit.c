@@ -55,7 +55,7 @@ static umb_object make_object(const umb_scene *scene, const umb_object_slot *slo
         o.live = (slot->flags & UMB_OBJECT_IGNORED) == 0;
         o.identity = slot->placement.identity;
         o.refine = o.mesh != NULL && (slot->flags & UMB_OBJECT_IS_SHAPE) != 0;
-        o.body = o.refine && occluder != UMB_NONE && o.mesh->convex && o.mesh->seen_count == o.mesh->triangle_count;
+        o.body = o.refine && o.mesh->convex && o.mesh->seen_count == o.mesh->triangle_count;
         o.boxed = o.body && o.mesh->box;
         o.box = is_box(&o, &slot->placement);
     }
