@@ -9,6 +9,7 @@
 
 #include <cmocka.h>
 
+#include "geometry/transform.h"
 #include "index/bvh.h"
 #include "index/walk.h"
 #include "support/box_meets.h"
@@ -190,6 +191,67 @@ static float pick_between(uint64_t *seed, float low, float high)
     return how == 0 ? low : how == 1 ? high : (float)at < low ? low : (float)at > high ? high : (float)at;
 }
 
+/* A corner of an object's or occluder's world triangle. */
+static void world_corner(const umb_mesh *mesh, const umb_transform *t, bool identity, uint32_t at, float out[3])
+{
+    const float *p = mesh->positions[at];
+    if (identity) {
+        memcpy(out, p, 3 * sizeof(out[0]));
+    } else {
+        umb_transform_point(t, p, out);
+    }
+}
+
+static void random_weights(uint64_t *seed, long double w[3])
+{
+    w[0] = random_below(seed, 4) == 0 ? 0 : random_in(seed, 0, 1);
+    w[1] = random_below(seed, 4) == 0 ? 0 : random_in(seed, 0, 1 - (double)w[0]);
+    w[2] = 1 - w[0] - w[1];
+}
+
+/* A point of a triangle of an item (objects, then occluders). False if only its box is known. */
+static bool point_of_item(const umb_committed *c, uint32_t item, uint64_t *seed, long double out[3])
+{
+    bool object = item < c->object_count;
+    const umb_object *o = &c->objects[object ? item : 0];
+    const umb_occluder *k = object ? NULL : &c->occluders[item - c->object_count];
+    const umb_mesh *mesh = object ? (o->refine ? o->mesh : NULL) : k->mesh;
+    if (mesh == NULL) {
+        return false;
+    }
+    uint32_t t = random_below(seed, object ? mesh->seen_count : mesh->triangle_count);
+    long double w[3];
+    float corner[3][3];
+    random_weights(seed, w);
+    for (int i = 0; i < 3; ++i) {
+        world_corner(mesh, object ? &o->transform : &k->transform, object ? o->identity : k->identity,
+                     mesh->triangles[t][i], corner[i]);
+    }
+    for (int a = 0; a < 3; ++a) {
+        out[a] = w[0] * corner[0][a] + w[1] * corner[1][a] + w[2] * corner[2][a];
+    }
+    return true;
+}
+
+static void check_triangles(const parts *p, const umb_committed *c, uint32_t item, uint64_t *seed)
+{
+    for (int trial = 0; trial < 12; ++trial) {
+        long double at[3];
+        bool held = false;
+        assert_true(point_of_item(c, item, seed, at));
+        for (uint32_t k = p->first[item]; k != UMB_NONE; k = p->list[k].next) {
+            const umb_aabb *b = &p->list[k].box;
+            bool in = true;
+            for (int i = 0; i < 3; ++i) {
+                long double slack = 1e-17L * (1 + fabsl(at[i])); /* what at itself is rounded by */
+                in = in && at[i] >= b->min[i] - slack && at[i] <= b->max[i] + slack;
+            }
+            held = held || in;
+        }
+        assert_true(held);
+    }
+}
+
 /* Parts lie in their item, and every point of the item in one of them. */
 static void check_item(const parts *p, uint32_t item, const umb_aabb *whole, bool exact, uint64_t *seed)
 {
@@ -251,19 +313,27 @@ static void check_index(const umb_index *index)
             check_range(t, k, stamps, &stamp);
         }
     }
+    bool shapes = umb_index_settings(index).kind == UMB_INDEX_BSP; /* are taken as triangles */
     assert_int_equal(nodes, t->node_count);
     assert_true(t->several ? p.count <= t->item_count : p.count == t->item_count);
     for (uint32_t i = 0; i < c->object_count; ++i) {
         assert_true(c->objects[i].live || p.first[i] == UMB_NONE);
         if (c->objects[i].live) {
-            check_item(&p, i, &c->objects[i].bounds, true, &seed);
+            bool shape = shapes && c->objects[i].refine && c->objects[i].mesh != NULL;
+            check_item(&p, i, &c->objects[i].bounds, !shape, &seed);
+            if (shape) {
+                check_triangles(&p, c, i, &seed);
+            }
             ++items;
         }
     }
     for (uint32_t i = 0; i < c->occluder_count; ++i) {
         assert_true(i >= c->first_free_occluder || p.first[c->object_count + i] == UMB_NONE);
         if (i >= c->first_free_occluder) {
-            check_item(&p, c->object_count + i, &c->occluders[i].bounds, true, &seed);
+            check_item(&p, c->object_count + i, &c->occluders[i].bounds, !shapes, &seed);
+            if (shapes) {
+                check_triangles(&p, c, c->object_count + i, &seed);
+            }
             ++items;
         }
     }
@@ -398,6 +468,75 @@ static void check_order(const umb_tree *t, uint64_t *seed, uint64_t *pairs)
     free(j.list);
 }
 
+/* The batches of slots, as a walk meets them. */
+typedef struct ledger {
+    uint32_t *before; /* per node and slot */
+} ledger;
+
+static bool enter(void *user, uint32_t node, uint32_t slot, uint32_t before)
+{
+    ledger *l = user;
+    l->before[node * UMB_NODE_WIDTH + slot] = before;
+    return true;
+}
+
+/* A walk in units, as a list with the number of the unit in `before`. */
+typedef struct units {
+    journey list;
+    ledger cells;
+    uint32_t *batches; /* beside the list: of the slots, in a walk of single nodes */
+    uint32_t count, largest;
+} units;
+
+static void note_unit(void *user, const umb_walk_slot *slots, uint32_t count, bool *open)
+{
+    units *u = user;
+    assert_true(count > 0);
+    for (uint32_t k = 0; k < count; ++k) {
+        assert_true(open[k]);
+        u->batches[u->list.count] = u->cells.before[slots[k].node * UMB_NODE_WIDTH + slots[k].slot];
+        note(&u->list, slots[k].node, slots[k].slot, u->count);
+    }
+    u->largest = count > u->largest ? count : u->largest;
+    u->count += 1;
+}
+
+/* No later unit hides an earlier one, but for what may be in one cell; all parts are in some unit. */
+static uint32_t check_units(const umb_tree *t, uint64_t *seed, uint64_t *pairs)
+{
+    size_t most = umb_walk_unit_slots(t);
+    umb_walk_eye eye = random_eye(seed);
+    units u = {.list = {.tree = t, .list = malloc((t->item_count + 1) * sizeof(met))}};
+    umb_walk_unit_visitor visitor = {note_unit, &u, malloc(most * sizeof(umb_walk_slot)), malloc(most * sizeof(bool))};
+    umb_walk_visitor by_node = {enter, &u.cells};
+    u.cells.before = malloc(most * sizeof(uint32_t));
+    u.batches = malloc(((size_t)t->item_count + 1) * sizeof(uint32_t));
+    assert_true(u.list.list != NULL && visitor.room != NULL && visitor.open != NULL && u.cells.before != NULL &&
+                u.batches != NULL);
+    umb_walk_front_to_back(t, &eye, &by_node);
+    bool strict = umb_walk_units(t, &eye, &visitor);
+    assert_true(u.list.count == t->item_count || t->several);
+    for (uint32_t a = 0; a < u.list.count && strict; ++a) {
+        const met *m = &u.list.list[a];
+        long double p[3];
+        for (int i = 0; i < 3; ++i) {
+            p[i] = m->box.min[i] + random_in(seed, 0, 1) * ((long double)m->box.max[i] - m->box.min[i]);
+        }
+        for (uint32_t b = a + 1; b < u.list.count; ++b) {
+            if (u.list.list[b].before > m->before && u.batches[a] != u.batches[b]) {
+                *pairs += 1;
+                assert_false(stands_before(&u.list.list[b].box, p, &eye));
+            }
+        }
+    }
+    free(u.list.list);
+    free(u.cells.before);
+    free(u.batches);
+    free(visitor.room);
+    free(visitor.open);
+    return u.largest;
+}
+
 /* No later batch hides an earlier one. */
 static void test_order(void **state)
 {
@@ -409,14 +548,186 @@ static void test_order(void **state)
         umb_scene *scene = make_scene(73, sets[i], 150, NULL);
         for (uint32_t k = 0; (name = umb_index_variant(k)) != NULL; ++k) {
             umb_index *index = make_index(scene, name);
-            for (int trial = 0; trial < 12; ++trial) {
+            bool tilted = umb_index_settings(index).kind == UMB_INDEX_BSP && sets[i] == SPREAD; /* test_rays() */
+            for (int trial = 0; trial < 12 && !tilted; ++trial) {
                 check_order(umb_index_tree(index), &seed, &pairs);
+                if (umb_index_settings(index).kind != UMB_INDEX_FLAT) {
+                    check_units(umb_index_tree(index), &seed, &pairs);
+                }
             }
             umb_index_destroy(index);
         }
         umb_scene_destroy(scene);
     }
     assert_true(pairs > 1000000);
+}
+
+/* On which side of a split a point lies: 1 above, -1 below, 0 too close to say. */
+static int point_side(const umb_tree *t, const umb_order *o, uint32_t split, const long double p[3])
+{
+    long double h;
+    if (o->axis[split] != UMB_ORDER_TILTED) {
+        h = p[o->axis[split]] - o->at[split];
+    } else {
+        const float(*c)[3] = t->planes[o->number[split]].points;
+        long double u[3], v[3], d[3], length = 0;
+        h = 0;
+        for (int i = 0; i < 3; ++i) {
+            u[i] = (long double)c[1][i] - c[0][i];
+            v[i] = (long double)c[2][i] - c[0][i];
+            d[i] = p[i] - c[0][i];
+        }
+        for (int i = 0; i < 3; ++i) {
+            int j = (i + 1) % 3, k = (i + 2) % 3;
+            long double n = u[j] * v[k] - u[k] * v[j];
+            h += n * d[i];
+            length += n * n;
+        }
+        h /= sqrtl(length);
+    }
+    return h > 1e-9L ? 1 : h < -1e-9L ? -1 : 0;
+}
+
+/* The slots of the cell that a point is in, from a node down: true if the item is among them; *batch is its. */
+static bool find_cell(const umb_tree *t, uint32_t number, const long double p[3], uint32_t ref, const ledger *l,
+                      uint32_t *batch, bool *sure)
+{
+    const umb_node *n = &t->nodes[number];
+    const umb_order *o = &t->orders[number];
+    uint32_t from = 0, end = n->count, split = o->kind == UMB_ORDER_PLANES ? 0 : UMB_ORDER_END;
+    while (split != UMB_ORDER_END) {
+        int side = point_side(t, o, split, p);
+        *sure = *sure && side != 0;
+        from = side > 0 ? o->middle[split] : from;
+        end = side > 0 ? end : o->middle[split];
+        split = o->next[split][side > 0];
+    }
+    for (uint32_t s = from; s < end; ++s) {
+        if (n->ref[s] == ref) {
+            *batch = l->before[number * UMB_NODE_WIDTH + s];
+            return true;
+        }
+        if ((n->ref[s] & UMB_REF_KIND) == UMB_REF_NODE && find_cell(t, n->ref[s], p, ref, l, batch, sure)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Where a ray meets the triangle of an object that has one: its distance, or -1. */
+static long double meet(const umb_object *o, const double eye[3], const double d[3], long double p[3])
+{
+    float c[3][3];
+    long double u[3], v[3], w[3], n[3], away = 0, along = 0;
+    for (int k = 0; k < 3; ++k) {
+        world_corner(o->mesh, &o->transform, o->identity, o->mesh->triangles[0][k], c[k]);
+    }
+    for (int i = 0; i < 3; ++i) {
+        u[i] = (long double)c[1][i] - c[0][i];
+        v[i] = (long double)c[2][i] - c[0][i];
+    }
+    for (int i = 0; i < 3; ++i) {
+        n[i] = u[(i + 1) % 3] * v[(i + 2) % 3] - u[(i + 2) % 3] * v[(i + 1) % 3];
+        away += n[i] * (c[0][i] - (long double)eye[i]);
+        along += n[i] * d[i];
+    }
+    if (along == 0 || away / along <= 0) {
+        return -1;
+    }
+    for (int i = 0; i < 3; ++i) {
+        p[i] = eye[i] + away / along * d[i];
+        w[i] = p[i] - c[0][i];
+    }
+    int a = fabsl(n[0]) > fabsl(n[1]) ? (fabsl(n[0]) > fabsl(n[2]) ? 0 : 2) : (fabsl(n[1]) > fabsl(n[2]) ? 1 : 2);
+    int i = (a + 1) % 3, j = (a + 2) % 3;
+    long double s = (w[i] * v[j] - w[j] * v[i]) / n[a], r = (u[i] * w[j] - u[j] * w[i]) / n[a];
+    return s > 1e-6L && r > 1e-6L && s + r < 1 - 1e-6L ? away / along : -1;
+}
+
+static umb_scene *make_triangles(uint64_t *seed, uint32_t count)
+{
+    umb_scene *scene;
+    assert_int_equal(umb_scene_create(NULL, &scene), UMB_OK);
+    for (uint32_t i = 0; i < count; ++i) {
+        static const uint32_t sides[3] = {0, 1, 2};
+        float corners[9];
+        for (int k = 0; k < 9; ++k) { /* some stand along axes, or share a plane */
+            corners[k] = random_below(seed, 3) == 0 ? (float)random_below(seed, 5) * 10 - 20
+                                                    : (float)random_in(seed, -30, 30);
+        }
+        if (i % 3 == 0) {
+            corners[i % 9 / 3 + 3] = corners[i % 9 / 3 + 6] = corners[i % 9 / 3];
+        }
+        umb_shape_def shape_def = {.positions = corners, .position_count = 3, .indices = sides, .index_count = 3};
+        umb_object_def def = {.flags = UMB_OBJECT_IS_SHAPE};
+        uint32_t id;
+        assert_int_equal(umb_scene_add_shape(scene, &shape_def, &def.shape), UMB_OK);
+        def.transform = (umb_transform){{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
+        assert_int_equal(umb_scene_add_object(scene, &def, &id), UMB_OK);
+    }
+    assert_int_equal(umb_scene_commit(scene), UMB_OK);
+    return scene;
+}
+
+/* All that a ray meets, in the order of the tree's batches: never a nearer thing in a later one. */
+static uint64_t check_ray(const umb_tree *t, const umb_committed *c, const umb_walk_eye *eye, const double d[3],
+                          const ledger *l)
+{
+    long double place[128];
+    uint32_t batch[128], count = 0;
+    uint64_t pairs = 0;
+    for (uint32_t i = 0; i < c->object_count && count < 128; ++i) {
+        long double p[3], away = meet(&c->objects[i], eye->at, d, p);
+        bool sure = true;
+        if (away > 0) {
+            bool found = find_cell(t, 0, p, UMB_REF_OBJECT | i, l, &batch[count], &sure);
+            assert_true(found || !sure);
+            place[count] = away;
+            count += found && sure;
+        }
+    }
+    for (uint32_t a = 0; a < count; ++a) {
+        for (uint32_t b = 0; b < count; ++b) {
+            assert_false(place[a] < place[b] && batch[a] > batch[b]);
+            pairs += batch[a] != batch[b];
+        }
+    }
+    return pairs;
+}
+
+/* Trees with planes of any slope, against rays through triangles. */
+static void test_rays(void **state)
+{
+    (void)state;
+    uint64_t seed = 81, pairs = 0;
+    for (int round = 0; round < 6; ++round) {
+        umb_scene *scene = make_triangles(&seed, 20 + 20 * (uint32_t)round);
+        const char *name;
+        for (uint32_t k = 0; (name = umb_index_variant(k)) != NULL; ++k) {
+            umb_index *index = make_index(scene, name);
+            const umb_tree *t = umb_index_tree(index);
+            ledger l = {malloc((t->node_count + (size_t)1) * UMB_NODE_WIDTH * sizeof(uint32_t))};
+            umb_walk_visitor visitor = {enter, &l};
+            assert_non_null(l.before);
+            check_index(index);
+            for (int trial = 0; trial < 20 && umb_index_settings(index).kind == UMB_INDEX_BSP; ++trial) {
+                umb_walk_eye eye = {{random_in(&seed, -40, 40), random_in(&seed, -40, 40), random_in(&seed, -40, 40)},
+                                    false};
+                assert_true(umb_walk_front_to_back(t, &eye, &visitor));
+                for (int ray = 0; ray < 50; ++ray) {
+                    double d[3];
+                    for (int i = 0; i < 3; ++i) {
+                        d[i] = random_in(&seed, -20, 20) - eye.at[i];
+                    }
+                    pairs += check_ray(t, umb_scene_committed(scene), &eye, d, &l);
+                }
+            }
+            free(l.before);
+            umb_index_destroy(index);
+        }
+        umb_scene_destroy(scene);
+    }
+    assert_true(pairs > 10000);
 }
 
 /* ---- frusta --------------------------------------------------------------------------------- */
@@ -443,6 +754,31 @@ static void free_crew(crew *c)
     umb_index_destroy(c->index);
 }
 
+/* By what the index knows of the object: its box, or in BSP trees its triangles, of which some points are tried. */
+static bool surely_meets(const umb_scene *scene, const crew *c, const umb_view *v, uint32_t id)
+{
+    umb_aabb box;
+    half_space h[UMB_FRUSTUM_PLANES + 6];
+    long double at[3];
+    uint64_t seed = 80 + id;
+    const umb_committed *now = umb_scene_committed(scene);
+    assert_true(umb_scene_object_bounds(scene, id, &box));
+    if (umb_index_settings(c->index).kind != UMB_INDEX_BSP || !point_of_item(now, id, &seed, at)) {
+        return box_surely_meets(v, &box, 1e-7L * REACH);
+    }
+    uint32_t n = half_spaces_of(v, &box, h);
+    for (int trial = 0; trial < 100; ++trial) {
+        bool in = point_of_item(now, id, &seed, at);
+        for (uint32_t k = 0; k < n - 6 && in; ++k) {
+            in = half_space_at(&h[k], at) > 1e-7L * REACH;
+        }
+        if (in) {
+            return true;
+        }
+    }
+    return false;
+}
+
 /* An index' answer is the flat one's, in its order and with its flags, but for objects that surely do not meet the
  * frustum. The unordered one may leave out others of these. */
 static void check_answer(const umb_scene *scene, crew *c, const umb_view *v, const umb_visible_set *flat,
@@ -459,9 +795,7 @@ static void check_answer(const umb_scene *scene, crew *c, const umb_view *v, con
             assert_int_equal(seen.inside[at], flat->inside[i]);
             ++at;
         } else {
-            umb_aabb box;
-            assert_true(umb_scene_object_bounds(scene, flat->objects[i], &box));
-            assert_false(flat->inside[i] != 0 || box_surely_meets(v, &box, 1e-7L * REACH));
+            assert_false(surely_meets(scene, c, v, flat->objects[i]));
             found[flat->objects[i]] = 2;
             *left_out += 1;
         }
@@ -475,9 +809,7 @@ static void check_answer(const umb_scene *scene, crew *c, const umb_view *v, con
         found[seen.objects[i]] = 3;
     }
     for (uint32_t i = 0; i < umb_scene_object_count(scene); ++i) {
-        umb_aabb box;
-        assert_true(found[i] != 1 || (umb_scene_object_bounds(scene, i, &box) &&
-                                      !box_surely_meets(v, &box, 1e-7L * REACH)));
+        assert_true(found[i] != 1 || !surely_meets(scene, c, v, i));
     }
     free(found);
 }
@@ -654,6 +986,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_names),    cmocka_unit_test(test_all_sets), cmocka_unit_test(test_order),
+        cmocka_unit_test(test_rays),
         cmocka_unit_test(test_frusta),   cmocka_unit_test(test_motion),   cmocka_unit_test(test_captures),
         cmocka_unit_test(test_failing_allocations),
     };

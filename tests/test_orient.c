@@ -10,6 +10,7 @@
 #include <cmocka.h>
 
 #include "geometry/orient.h"
+#include "geometry/side.h"
 
 __extension__ typedef __int128 wide;
 
@@ -126,12 +127,46 @@ static void test_least_steps(void **state)
     assert_int_not_equal(umb_orient(huge[3], huge[1], huge[3], huge[0]), 0);
 }
 
+/* Points of doubles: multiples of 2^-40 near planes through small whole numbers, where 128-bit sums are exact. */
+static void test_sides_of_doubles(void **state)
+{
+    (void)state;
+    uint32_t zeros = 0;
+    for (int trial = 0; trial < 200000; ++trial) {
+        float plane[3][3];
+        double p[3];
+        int64_t c[3][3], q[3];
+        for (int k = 0; k < 9; ++k) {
+            c[k / 3][k % 3] = random_below(41) - 20;
+            plane[k / 3][k % 3] = (float)c[k / 3][k % 3];
+        }
+        int64_t s = random_below(9) - 4, t = random_below(9) - 4;
+        for (int i = 0; i < 3; ++i) { /* a + s u + t v, and perhaps a least step beside it */
+            q[i] = (c[0][i] + s * (c[1][i] - c[0][i]) + t * (c[2][i] - c[0][i])) * ((int64_t)1 << 40) +
+                   (trial % 3 == 0 ? 0 : random_below(3) - 1);
+            p[i] = ldexp((double)q[i], -40);
+        }
+        wide point = 0, along = 0;
+        for (int i = 0; i < 3; ++i) {
+            int j = (i + 1) % 3, k = (i + 2) % 3;
+            wide n = (wide)(c[1][j] - c[0][j]) * (c[2][k] - c[0][k]) - (wide)(c[1][k] - c[0][k]) * (c[2][j] - c[0][j]);
+            point += n * (q[i] - c[0][i] * ((int64_t)1 << 40));
+            along += n * q[i];
+        }
+        zeros += point == 0;
+        assert_int_equal(umb_side_of_point((const float(*)[3])plane, p), (point > 0) - (point < 0));
+        assert_int_equal(umb_side_of_direction((const float(*)[3])plane, p), (along > 0) - (along < 0));
+    }
+    assert_true(zeros > 50000);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_lattice_planes),
         cmocka_unit_test(test_unlike_sizes),
         cmocka_unit_test(test_least_steps),
+        cmocka_unit_test(test_sides_of_doubles),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

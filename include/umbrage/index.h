@@ -24,7 +24,10 @@ typedef enum umb_index_kind {
     UMB_INDEX_OCTREE = 3,
     UMB_INDEX_QUADTREE = 4,
     /* Cells of one size, an object in each that it reaches into, found through blocks of them (Gummerus 3.3) */
-    UMB_INDEX_GRID = 5
+    UMB_INDEX_GRID = 5,
+    /* Cut by the planes of triangles, of objects that are their shape (UMB_OBJECT_IS_SHAPE) and of occluders, else of the
+       faces of boxes; an object is in each cell that its triangles reach into (Gummerus 3.6) */
+    UMB_INDEX_BSP = 6
 } umb_index_kind;
 
 /* How a kind decides where to split. */
@@ -40,12 +43,28 @@ typedef enum umb_index_rule {
     /* OCTREE, QUADTREE: each object in one cell, that of its middle, of its own size or larger */
     UMB_RULE_LOOSE = 3,
     /* GRID: crowded cells have a grid of their own */
-    UMB_RULE_NESTED = 4
+    UMB_RULE_NESTED = 4,
+    /* BSP: of the largest triangles the plane that makes the halves small for what they hold (Naylor 1993). The default:
+       of a few at random the one that cuts the fewest and divides most evenly (Abrash 1997) */
+    UMB_RULE_NAYLOR = 5,
+    /* KDTREE: across the longest side of what is in the cell, the face near its middle that cuts the fewest (Bittner 1998) */
+    UMB_RULE_BITTNER = 6,
+    /* KDTREE: the same, but what is about as large as its cell stays there (Aila and Miettinen) */
+    UMB_RULE_AILA = 7,
+    /* BVH: near objects are grouped, then near groups (Gummerus 3.1); Meister and Bittner 2018 */
+    UMB_RULE_BOTTOM_UP = 8
 } umb_index_rule;
+
+/* BSP, as bits. */
+enum {
+    UMB_INDEX_SPLIT = 1u << 0, /* cut triangles in two; else one that is cut is in both halves as a whole */
+    UMB_INDEX_NODES = 1u << 1  /* what lies in a plane stays with the node, between its halves; else it is below */
+};
 
 typedef struct umb_index_def {
     umb_index_kind kind;
     umb_index_rule rule;
+    uint32_t options; /* UMB_INDEX_... bits */
     umb_tasks tasks; /* for building; the result does not depend on it */
 } umb_index_def;
 

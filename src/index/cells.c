@@ -7,6 +7,9 @@
 void umb_cells_start(umb_cells *c, const umb_allocator *a, const umb_bvh_item *items, uint32_t count)
 {
     *c = (umb_cells){.allocator = a, .ordered = true};
+    if (count == 0) {
+        return;
+    }
     if (umb_memory_reserve(a, (void **)&c->stack, &c->stack_capacity, count, sizeof(c->stack[0]))) {
         memcpy(c->stack, items, count * sizeof(items[0]));
         c->top = count;
@@ -21,6 +24,7 @@ void umb_cells_free(umb_cells *c)
     umb_memory_free(c->allocator, c->splits, c->split_capacity * sizeof(c->splits[0]));
     umb_memory_free(c->allocator, c->cuts, c->cut_capacity * sizeof(c->cuts[0]));
     umb_memory_free(c->allocator, c->points, c->point_capacity * sizeof(c->points[0]));
+    umb_memory_free(c->allocator, c->planes, c->plane_capacity * sizeof(c->planes[0]));
     umb_memory_free(c->allocator, c->stack, c->stack_capacity * sizeof(c->stack[0]));
     *c = (umb_cells){0};
 }
@@ -52,6 +56,26 @@ static bool make_room(umb_cells *c, uint32_t more)
                                     sizeof(c->splits[0])) ||
                 !umb_memory_reserve(c->allocator, (void **)&c->cuts, &c->cut_capacity, need, sizeof(c->cuts[0]));
     return !c->failed;
+}
+
+void umb_cells_push(umb_cells *c, const umb_bvh_item *part)
+{
+    if (umb_memory_reserve(c->allocator, (void **)&c->stack, &c->stack_capacity, c->top + 1, sizeof(c->stack[0]))) {
+        c->stack[c->top++] = *part;
+    } else {
+        c->failed = true;
+    }
+}
+
+uint32_t umb_cells_add_plane(umb_cells *c, const float points[3][3])
+{
+    if (!umb_memory_reserve(c->allocator, (void **)&c->planes, &c->plane_capacity, (size_t)c->plane_count + 1,
+                            sizeof(c->planes[0]))) {
+        c->failed = true;
+        return 0;
+    }
+    memcpy(c->planes[c->plane_count].points, points, sizeof(c->planes[0].points));
+    return c->plane_count++;
 }
 
 umb_aabb umb_cells_box(const umb_cells *c, umb_cell_run run)
@@ -253,5 +277,17 @@ umb_result umb_cells_finish(umb_cells *c, uint32_t root, umb_built *out)
     umb_aabb all = bounds_of(c), box;
     umb_cut_costs costs = umb_cut_costs_of(umb_half_area(all.min, all.max), c->count);
     cut_all(c, &costs, root, &box);
-    return umb_bvh_lay_out(c->allocator, c->items, c->splits, root, c->ordered ? c->cuts : NULL, c->points, out);
+    umb_result result =
+        umb_bvh_lay_out(c->allocator, c->items, c->splits, root, c->ordered ? c->cuts : NULL, c->points, out);
+    if (result == UMB_OK && c->ordered && c->plane_count > 0) {
+        size_t bytes = c->plane_count * sizeof(c->planes[0]);
+        out->planes = umb_memory_allocate(c->allocator, bytes);
+        if (out->planes == NULL) {
+            umb_built_free(out, c->allocator);
+            return UMB_ERROR_MEMORY;
+        }
+        memcpy(out->planes, c->planes, bytes);
+        out->plane_count = c->plane_count;
+    }
+    return result;
 }

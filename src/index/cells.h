@@ -45,6 +45,8 @@ typedef struct umb_cells {
     umb_bvh_item *items; /* parts, by leaves, from left to right */
     umb_bvh_split *splits; /* split k has the parts before k on its left (bvh.h) */
     umb_cell_cut *cuts;    /* of the splits */
+    umb_tilted_plane *planes; /* that cuts name */
+    uint32_t plane_count;
     umb_cell_point *points; /* of splits that are TOP of a group; NULL: there are none */
     /* Parts of the cells that are still to be cut:
      *
@@ -58,13 +60,18 @@ typedef struct umb_cells {
     uint32_t count;
     bool failed;           /* no memory, or too many parts: all that follows does nothing */
     bool ordered;          /* every split above the leaves has a plane */
-    size_t item_capacity, split_capacity, cut_capacity, point_capacity, stack_capacity;
+    size_t item_capacity, split_capacity, cut_capacity, point_capacity, stack_capacity,
+        plane_capacity;
 } umb_cells;
 
 /* Begin, with these items on the stack, as the run from 0 on. */
 void umb_cells_start(umb_cells *c, const umb_allocator *a, const umb_bvh_item *items, uint32_t count);
 void umb_cells_free(umb_cells *c);
 
+/* Put a part on top of the stack. */
+void umb_cells_push(umb_cells *c, const umb_bvh_item *part);
+/* The number of a plane, for cuts. */
+uint32_t umb_cells_add_plane(umb_cells *c, const float points[3][3]);
 /* The box of a run that is not empty. */
 umb_aabb umb_cells_box(const umb_cells *c, umb_cell_run run);
 /* Cut a run in two: it becomes what is below the plane, *upper is what is above. What lies in the plane is below.

@@ -2,7 +2,8 @@
 #include <math.h>
 #include <string.h>
 
-#include "bvh.h"
+#include "bottom_up.h"
+#include "bsp.h"
 #include "cut.h"
 #include "grid.h"
 #include "index_name.h"
@@ -91,7 +92,7 @@ static umb_result build_flat(const umb_allocator *a, const umb_bvh_item *items, 
     return UMB_OK;
 }
 
-static umb_result build(const umb_index *index, umb_bvh_item *items, uint32_t count, umb_built *out)
+static umb_result build(const umb_index *index, const umb_committed *scene, umb_bvh_item *items, uint32_t count, umb_built *out)
 {
     const umb_allocator *a = &index->allocator;
     switch (index->def.kind) {
@@ -103,9 +104,14 @@ static umb_result build(const umb_index *index, umb_bvh_item *items, uint32_t co
         return umb_octree_build(a, index->def.rule, 7, items, count, out);
     case UMB_INDEX_QUADTREE:
         return umb_octree_build(a, index->def.rule, umb_octree_flat_axes(items, count), items, count, out);
+    case UMB_INDEX_BSP:
+        return umb_bsp_build(a, &index->def, scene, items, count, out);
     case UMB_INDEX_GRID:
         return umb_grid_build(a, index->def.rule, items, count, out);
     default:
+        if (index->def.rule == UMB_RULE_BOTTOM_UP) {
+            return umb_bottom_up_build(a, false, items, count, out);
+        }
         return umb_bvh_build(a, &index->def.tasks, items, count, out);
     }
 }
@@ -274,7 +280,7 @@ static umb_result rebuild(umb_index *index, const umb_committed *c)
         result = UMB_ERROR_MEMORY;
         if (items != NULL) {
             gather_items(c, items);
-            result = build(index, items, count, &built);
+            result = build(index, c, items, count, &built);
         }
         umb_memory_free(a, items, count * sizeof(items[0]));
     }

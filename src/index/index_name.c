@@ -6,22 +6,34 @@ typedef struct variant {
     const char *name;
     umb_index_kind kind;
     umb_index_rule rule;
+    uint32_t options;
 } variant;
 
 /* Each kind's plain name first. */
 static const variant variants[] = {
-    {"bvh", UMB_INDEX_BVH, UMB_RULE_DEFAULT},
-    {"flat", UMB_INDEX_FLAT, UMB_RULE_DEFAULT},
-    {"kdtree", UMB_INDEX_KDTREE, UMB_RULE_DEFAULT},
-    {"kdtree,median", UMB_INDEX_KDTREE, UMB_RULE_MEDIAN},
-    {"octree", UMB_INDEX_OCTREE, UMB_RULE_DEFAULT},
-    {"octree,irregular", UMB_INDEX_OCTREE, UMB_RULE_IRREGULAR},
-    {"octree,loose", UMB_INDEX_OCTREE, UMB_RULE_LOOSE},
-    {"quadtree", UMB_INDEX_QUADTREE, UMB_RULE_DEFAULT},
-    {"quadtree,irregular", UMB_INDEX_QUADTREE, UMB_RULE_IRREGULAR},
-    {"quadtree,loose", UMB_INDEX_QUADTREE, UMB_RULE_LOOSE},
-    {"grid", UMB_INDEX_GRID, UMB_RULE_DEFAULT},
-    {"grid,nested", UMB_INDEX_GRID, UMB_RULE_NESTED},
+    {"bvh", UMB_INDEX_BVH, UMB_RULE_DEFAULT, 0},
+    {"bvh,bottom-up", UMB_INDEX_BVH, UMB_RULE_BOTTOM_UP, 0},
+    {"flat", UMB_INDEX_FLAT, UMB_RULE_DEFAULT, 0},
+    {"kdtree", UMB_INDEX_KDTREE, UMB_RULE_DEFAULT, 0},
+    {"kdtree,median", UMB_INDEX_KDTREE, UMB_RULE_MEDIAN, 0},
+    {"kdtree,bittner", UMB_INDEX_KDTREE, UMB_RULE_BITTNER, 0},
+    {"kdtree,aila", UMB_INDEX_KDTREE, UMB_RULE_AILA, 0},
+    {"octree", UMB_INDEX_OCTREE, UMB_RULE_DEFAULT, 0},
+    {"octree,irregular", UMB_INDEX_OCTREE, UMB_RULE_IRREGULAR, 0},
+    {"octree,loose", UMB_INDEX_OCTREE, UMB_RULE_LOOSE, 0},
+    {"quadtree", UMB_INDEX_QUADTREE, UMB_RULE_DEFAULT, 0},
+    {"quadtree,irregular", UMB_INDEX_QUADTREE, UMB_RULE_IRREGULAR, 0},
+    {"quadtree,loose", UMB_INDEX_QUADTREE, UMB_RULE_LOOSE, 0},
+    {"bsp", UMB_INDEX_BSP, UMB_RULE_DEFAULT, 0},
+    {"bsp,nodes", UMB_INDEX_BSP, UMB_RULE_DEFAULT, UMB_INDEX_NODES},
+    {"bsp,split", UMB_INDEX_BSP, UMB_RULE_DEFAULT, UMB_INDEX_SPLIT},
+    {"bsp,split,nodes", UMB_INDEX_BSP, UMB_RULE_DEFAULT, UMB_INDEX_SPLIT | UMB_INDEX_NODES},
+    {"bsp,naylor", UMB_INDEX_BSP, UMB_RULE_NAYLOR, 0},
+    {"bsp,naylor,nodes", UMB_INDEX_BSP, UMB_RULE_NAYLOR, UMB_INDEX_NODES},
+    {"bsp,naylor,split", UMB_INDEX_BSP, UMB_RULE_NAYLOR, UMB_INDEX_SPLIT},
+    {"bsp,naylor,split,nodes", UMB_INDEX_BSP, UMB_RULE_NAYLOR, UMB_INDEX_SPLIT | UMB_INDEX_NODES},
+    {"grid", UMB_INDEX_GRID, UMB_RULE_DEFAULT, 0},
+    {"grid,nested", UMB_INDEX_GRID, UMB_RULE_NESTED, 0},
 };
 
 #define VARIANTS (sizeof(variants) / sizeof(variants[0]))
@@ -29,7 +41,8 @@ static const variant variants[] = {
 static const variant *find(const umb_index_def *def)
 {
     for (size_t k = 0; k < VARIANTS; ++k) {
-        if (variants[k].kind == def->kind && variants[k].rule == def->rule) {
+        if (variants[k].kind == def->kind && variants[k].rule == def->rule &&
+            variants[k].options == def->options) {
             return &variants[k];
         }
     }
@@ -43,13 +56,14 @@ bool umb_index_name_known(const umb_index_def *def)
 
 uint32_t umb_index_name_pack(const umb_index_def *def)
 {
-    return (uint32_t)def->kind | (uint32_t)def->rule << 8;
+    return (uint32_t)def->kind | (uint32_t)def->rule << 8 | def->options << 16;
 }
 
 bool umb_index_name_unpack(uint32_t packed, umb_index_def *out)
 {
     out->kind = (umb_index_kind)(packed & 0xFF);
-    out->rule = (umb_index_rule)(packed >> 8);
+    out->rule = (umb_index_rule)(packed >> 8 & 0xFF);
+    out->options = packed >> 16;
     return find(out) != NULL;
 }
 
@@ -78,6 +92,7 @@ bool umb_index_parse(const char *text, umb_index_def *out)
         if (same_words(text, variants[k].name)) {
             out->kind = variants[k].kind;
             out->rule = variants[k].rule;
+            out->options = variants[k].options;
             return true;
         }
     }

@@ -17,6 +17,10 @@
 /* Above this count the plane is looked for in bins first. */
 #define EXACT_PARTS 1024
 #define BINS 64
+/* Bittner, Aila: how far from the middle of a cell a plane may be, of its extent. */
+#define WINDOW 0.125
+/* Aila: what fills more of its cell than this stays there. */
+#define FILLED 0.5
 /* What opening a cell costs, in tests of a box. */
 #define OPEN_COST 1.0
 
@@ -99,13 +103,33 @@ static double median_cost(const sweep *s, division d)
     return off > 0.25 || 2 * cuts > s->c->run.count ? INFINITY : cuts + 0.5 * off;
 }
 
+/* Cuts, and far less than one for the distance from the middle of the cell. */
+static double middle_cost(const sweep *s, float at, division d)
+{
+    double low = s->box.min[s->axis], extent = s->box.max[s->axis] - low;
+    return cut_count(s->c, d) + fabs((at - low) / extent - 0.5);
+}
+
+static double cost_of(const sweep *s, float at, division d)
+{
+    switch (s->k->rule) {
+    case UMB_RULE_MEDIAN:
+        return median_cost(s, d);
+    case UMB_RULE_BITTNER:
+    case UMB_RULE_AILA:
+        return middle_cost(s, at, d);
+    default:
+        return area_cost(s, at, d);
+    }
+}
+
 static void consider(const sweep *s, float at, division d, plane *best)
 {
     if (d.below == 0 || d.above == 0 || cut_count(s->c, d) > s->c->extra ||
         (d.below == s->c->run.count && d.above == s->c->run.count)) {
         return;
     }
-    double cost = s->k->rule == UMB_RULE_MEDIAN ? median_cost(s, d) : area_cost(s, at, d);
+    double cost = cost_of(s, at, d);
     if (cost < best->cost) {
         *best = (plane){s->axis, at, cost};
     }
@@ -194,6 +218,30 @@ static void refine(sweep *s, plane *best)
     }
 }
 
+/* Across the longest side: a face near the middle, or where there is none the middle. */
+static void try_middle(sweep *s, plane *best)
+{
+    int axis = 0;
+    double extent[3];
+    for (int i = 0; i < 3; ++i) {
+        extent[i] = (double)s->box.max[i] - s->box.min[i];
+        axis = extent[i] > extent[axis] ? i : axis;
+    }
+    double middle = s->box.min[axis] + 0.5 * extent[axis];
+    s->axis = axis;
+    sweep_faces(s, (float)(middle - WINDOW * extent[axis]), (float)(middle + WINDOW * extent[axis]), best);
+    if (isinf(best->cost)) {
+        const umb_bvh_item *parts = s->k->cells.stack + s->c->run.first;
+        float at = (float)middle;
+        division d = {0, 0};
+        for (uint32_t i = 0; i < s->c->run.count; ++i) {
+            d.below += parts[i].min[axis] < at || parts[i].max[axis] <= at;
+            d.above += parts[i].max[axis] > at;
+        }
+        consider(s, at, d, best);
+    }
+}
+
 static bool choose(const kd *k, const cell *c, plane *best)
 {
     sweep s = {.k = k, .c = c, .box = umb_cells_box(&k->cells, c->run)};
@@ -203,6 +251,10 @@ static bool choose(const kd *k, const cell *c, plane *best)
             try_axis(&s, (int)((c->depth + turn) % 3), best);
         }
         return !isinf(best->cost);
+    }
+    if (k->rule == UMB_RULE_BITTNER || k->rule == UMB_RULE_AILA) {
+        try_middle(&s, best);
+        return best->cost < 0.5 * c->run.count;
     }
     for (int axis = 0; axis < 3; ++axis) {
         try_axis(&s, axis, best);
@@ -231,9 +283,46 @@ static uint32_t build_halves(kd *k, const cell *c, const plane *p)
     return umb_cells_join(&k->cells, left, middle, right, &where);
 }
 
+static double volume_of(const float min[3], const float max[3])
+{
+    return ((double)max[0] - min[0]) * ((double)max[1] - min[1]) * ((double)max[2] - min[2]);
+}
+
+/* Move to the front what is about as large as its cell: cutting it gains nothing. Returns how many. */
+static uint32_t sift_large(kd *k, const cell *c)
+{
+    umb_bvh_item *parts = k->cells.stack + c->run.first;
+    umb_aabb box = umb_cells_box(&k->cells, c->run);
+    double least = FILLED * volume_of(box.min, box.max);
+    uint32_t n = 0;
+    for (uint32_t i = 0; i < c->run.count && least > 0.0; ++i) {
+        if (volume_of(parts[i].min, parts[i].max) >= least) {
+            umb_bvh_item t = parts[i];
+            parts[i] = parts[n];
+            parts[n++] = t;
+        }
+    }
+    return n;
+}
+
+/* What is large stays, the rest is cut. */
+static uint32_t build_with_own(kd *k, const cell *c, uint32_t own)
+{
+    static const umb_cell_cut none = {.axis = UMB_CELL_NO_PLANE};
+    cell rest = *c;
+    rest.run.first += own;
+    rest.run.count -= own;
+    uint32_t left = umb_cells_add_leaf(&k->cells, (umb_cell_run){c->run.first, own}), middle = k->cells.count;
+    return umb_cells_join(&k->cells, left, middle, build(k, &rest), &none);
+}
+
 static uint32_t build(kd *k, const cell *c)
 {
     plane p;
+    uint32_t own = k->rule == UMB_RULE_AILA && c->run.count > LEAF_PARTS ? sift_large(k, c) : 0;
+    if (own > 0) {
+        return build_with_own(k, c, own);
+    }
     if (c->run.count <= LEAF_PARTS || c->depth >= k->most_depth || k->cells.failed || !choose(k, c, &p)) {
         return umb_cells_add_leaf(&k->cells, c->run);
     }

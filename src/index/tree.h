@@ -63,9 +63,9 @@ typedef struct umb_order {
     uint32_t pad_end;
 } umb_order;
 
-/* The points with n.p = d in real numbers: these doubles define it. The upper side is n.p > d. */
+/* The plane through three points. From its upper side they are seen counter-clockwise. */
 typedef struct umb_tilted_plane {
-    double n[3], d;
+    float points[3][3];
 } umb_tilted_plane;
 
 /* What lies side by side in the list of a tree's objects. */

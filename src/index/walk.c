@@ -1,32 +1,8 @@
 #include "walk.h"
 
-#include <math.h>
-
-#include "geometry/expansion.h"
+#include "geometry/side.h"
 
 /* ---- sides ---------------------------------------------------------------------------------- */
-
-/* The exact sign of n.e - d, each product in two parts (fma rounds once, whatever the machine). */
-static int tilted_side(const umb_tilted_plane *p, const umb_walk_eye *eye)
-{
-    double terms[7], sum = 0.0, size = 0.0;
-    for (int i = 0; i < 3; ++i) {
-        terms[2 * i] = p->n[i] * eye->at[i];
-        sum += terms[2 * i];
-        size += fabs(terms[2 * i]);
-    }
-    double d = eye->parallel ? 0.0 : p->d;
-    sum -= d;
-    size += fabs(d);
-    if (fabs(sum) > 0x1p-49 * size) { /* six roundings of at most 2^-53 of the size each, with room */
-        return sum > 0.0 ? 1 : -1;
-    }
-    for (int i = 0; i < 3; ++i) {
-        terms[2 * i + 1] = fma(p->n[i], eye->at[i], -terms[2 * i]);
-    }
-    terms[6] = -d;
-    return umb_sign_of_sum(terms, 7);
-}
 
 /* True if the eye is on the upper side. */
 static bool above(const umb_walk_eye *eye, int axis, float at)
@@ -36,8 +12,11 @@ static bool above(const umb_walk_eye *eye, int axis, float at)
 
 static bool split_above(const umb_tree *tree, const umb_order *o, uint32_t split, const umb_walk_eye *eye)
 {
-    return o->axis[split] == UMB_ORDER_TILTED ? tilted_side(&tree->planes[o->number[split]], eye) > 0
-                                              : above(eye, o->axis[split], o->at[split]);
+    if (o->axis[split] != UMB_ORDER_TILTED) {
+        return above(eye, o->axis[split], o->at[split]);
+    }
+    const float(*points)[3] = tree->planes[o->number[split]].points;
+    return (eye->parallel ? umb_side_of_direction(points, eye->at) : umb_side_of_point(points, eye->at)) > 0;
 }
 
 /* ---- one node ------------------------------------------------------------------------------- */
@@ -182,6 +161,78 @@ bool umb_walk_front_to_back(const umb_tree *tree, const umb_walk_eye *eye, const
     }
     if (tree->node_count > 0 && !tree->flat) {
         walk(tree, 0, eye, visitor, 0);
+    }
+    return tree->orders != NULL;
+}
+
+/* ---- units ---------------------------------------------------------------------------------- */
+
+size_t umb_walk_unit_slots(const umb_tree *tree)
+{
+    return (size_t)tree->node_count * UMB_NODE_WIDTH + 1;
+}
+
+static const umb_node *node_of(const umb_tree *tree, const umb_walk_slot *s)
+{
+    return &tree->nodes[tree->nodes[s->node].ref[s->slot]];
+}
+
+/* Append one batch of a node. */
+static size_t add_batch(const umb_tree *tree, const umb_walk_eye *eye, uint32_t node, uint32_t batch,
+                        umb_walk_slot *out)
+{
+    uint8_t slots[UMB_NODE_WIDTH], batches[UMB_NODE_WIDTH];
+    size_t n = 0;
+    umb_walk_slots(tree, node, eye, slots, batches);
+    for (uint32_t k = 0; k < tree->nodes[node].count; ++k) {
+        if (batches[k] == batch) {
+            out[n++] = (umb_walk_slot){node, slots[k]};
+        }
+    }
+    return n;
+}
+
+/* Show a unit, and keep of it, at its front, the slots whose nodes are to be opened. */
+static size_t show(const umb_tree *tree, const umb_walk_unit_visitor *v, umb_walk_slot *unit, size_t count)
+{
+    size_t kept = 0;
+    for (size_t k = 0; k < count; ++k) {
+        v->open[k] = true;
+    }
+    v->visit(v->user, unit, (uint32_t)count, v->open);
+    for (size_t k = 0; k < count; ++k) {
+        uint32_t ref = tree->nodes[unit[k].node].ref[unit[k].slot];
+        if (v->open[k] && (ref & UMB_REF_KIND) == UMB_REF_NODE) {
+            unit[kept++] = unit[k];
+        }
+    }
+    return kept;
+}
+
+/* Below the slots from `from` to `end` of the room: their nodes' first batches together, then the second ones, ... The
+ * lists of a way down are of different slots, so the room holds them all. */
+static void walk_below(const umb_tree *tree, const umb_walk_eye *eye, const umb_walk_unit_visitor *v, size_t from,
+                       size_t end)
+{
+    for (uint32_t batch = 0; batch < UMB_NODE_WIDTH && from < end; ++batch) {
+        size_t top = end;
+        for (size_t k = from; k < end; ++k) {
+            uint32_t node = (uint32_t)(node_of(tree, &v->room[k]) - tree->nodes);
+            top += add_batch(tree, eye, node, batch, v->room + top);
+        }
+        if (top > end) {
+            walk_below(tree, eye, v, end, end + show(tree, v, v->room + end, top - end));
+        }
+    }
+}
+
+bool umb_walk_units(const umb_tree *tree, const umb_walk_eye *eye, const umb_walk_unit_visitor *visitor)
+{
+    for (uint32_t batch = 0; batch < UMB_NODE_WIDTH && tree->node_count > 0; ++batch) {
+        size_t count = add_batch(tree, eye, 0, batch, visitor->room);
+        if (count > 0) {
+            walk_below(tree, eye, visitor, 0, show(tree, visitor, visitor->room, count));
+        }
     }
     return tree->orders != NULL;
 }

@@ -32,4 +32,23 @@ typedef struct umb_walk_visitor {
 
 bool umb_walk_front_to_back(const umb_tree *tree, const umb_walk_eye *eye, const umb_walk_visitor *visitor);
 
+/* The same in units, for methods that ask about many boxes at once (Tai and Hsu 3.3, parallel units). A unit is one batch
+ * of each of several nodes that cannot hide each other's contents. visit gets its slots, nearer units first, and
+ * clears open[k] of slots that refer to nodes to stay above these. room and open have umb_walk_unit_slots() entries. Not
+ * for flat indices. Returns true if the order is strict: nothing below a later unit hides anything below an earlier
+ * one, but for what is in the same cell, whose contents come level by level. */
+typedef struct umb_walk_slot {
+    uint32_t node, slot;
+} umb_walk_slot;
+
+typedef struct umb_walk_unit_visitor {
+    void (*visit)(void *user, const umb_walk_slot *slots, uint32_t count, bool *open);
+    void *user;
+    umb_walk_slot *room;
+    bool *open;
+} umb_walk_unit_visitor;
+
+size_t umb_walk_unit_slots(const umb_tree *tree);
+bool umb_walk_units(const umb_tree *tree, const umb_walk_eye *eye, const umb_walk_unit_visitor *visitor);
+
 #endif

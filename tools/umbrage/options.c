@@ -244,13 +244,19 @@ static const char *read_method(options *o, const char *text)
 
 static const char *read_index(options *o, const char *text)
 {
-    static char names[640];
+    static char names[320];
     if (umb_index_parse(text, &o->index)) {
         return NULL;
     }
-    size_t used = (size_t)snprintf(names, sizeof names, "one of");
-    for (uint32_t k = 0; umb_index_variant(k) != NULL && used < sizeof names; ++k) {
-        used += (size_t)snprintf(names + used, sizeof names - used, "%s %s", k > 0 ? ";" : "", umb_index_variant(k));
+    size_t used = (size_t)snprintf(names, sizeof names, "one of"), kind = strcspn(text, ","), listed = 0;
+    for (int round = 0; round < 2 && listed == 0; ++round) { /* of a known kind all there are, else the plain ones */
+        const char *name;
+        for (uint32_t k = 0; (name = umb_index_variant(k)) != NULL && used < sizeof names; ++k) {
+            bool own = strcspn(name, ",") == kind && strncmp(name, text, kind) == 0;
+            if (round == 0 ? own : strchr(name, ',') == NULL) {
+                used += (size_t)snprintf(names + used, sizeof names - used, "%s %s", listed++ > 0 ? ";" : "", name);
+            }
+        }
     }
     return names;
 }
@@ -467,7 +473,7 @@ static const option_spec specs[] = {
      "depth of the far plane (default: the scene's farthest corner)"},
 
     {"method", 0, VIEWS, "NAME", read_method, "raster or none: frustum only (default raster)"},
-    {"index", 0, SCENES, "NAME", read_index, "bvh, flat, kdtree, octree, quadtree, grid: how objects are found (default bvh)"},
+    {"index", 0, SCENES, "NAME", read_index, "bvh, flat, kdtree, octree, quadtree, bsp, grid: how objects are found (default bvh)"},
     {"buffer", 0, VIEWS, "WxH", read_buffer, "the method's own raster (default 1024x288)"},
     {"coherence", 0, MANY_VIEWS, "NAMES", read_coherence,
      "carry over: list, hierarchy, propagation, conservative, rest, all (default none)"},
