@@ -1,0 +1,534 @@
+/* Leyvand's tables again, and how cost and set size depend on the method's settings: one view cell at a time.
+ *
+ *   bench_region DATA [--only TEXT] [--rays N] [--repeat N] [--most TRIANGLES] [--plots FOLDER]
+ *
+ * DATA is bench/papers/leyvand.csv, which says what is measured. Prints Markdown tables: times are the least of
+ * --repeat (3) answers on one core, sets in triangles of their objects and in objects. "Seen" is what --rays (2M)
+ * rays from the cell prove; what an answer lacks of it is a miss. --only: rows whose table or label contains TEXT;
+ * --most: leave out larger generated scenes. --plots writes region-TABLE-time.svg and -size.svg for the sweeps.
+ * Exit code 1 on a miss. */
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "compare/svg_dots.h"
+#include "io/model.h"
+#include "truth/region_truth.h"
+#include "umbrage/region.h"
+
+enum { MOST_ROWS = 256, MOST_PLACES = 32, COLUMNS = 14 };
+
+typedef struct place {
+    char scene[128], name[32];
+    double at[3];
+} place;
+
+/* What one answer of the engine costs and holds. */
+typedef struct answer {
+    double solve_ms, refine_ms;
+    uint64_t pvs_triangles, refined_triangles;
+    uint32_t pvs, refined, misses;
+} answer;
+
+typedef struct row {
+    char table[32], label[32], scene[128], place[32];
+    double size, height, outer;
+    uint32_t resolution, umbrae;
+    bool half;
+    char theirs[3][16]; /* seconds, PVS, VS */
+    bool done, is_thesis;
+    answer ours, thesis; /* thesis: two squares, one interval */
+    uint32_t seen;
+    uint64_t seen_triangles, met, rays;
+} row;
+
+typedef struct study {
+    place places[MOST_PLACES];
+    row rows[MOST_ROWS];
+    uint32_t place_count, row_count;
+    const char *only, *plots;
+    uint64_t rays, most;
+    uint32_t repeat;
+    umb_error error;
+} study;
+
+/* A scene with everything that looks at it. */
+typedef struct world {
+    model *model;
+    umb_scene *scene;
+    umb_index *index;
+    umb_region *region;
+    truth *oracle;
+    region_result seen; /* from the last cell */
+    umb_region_query cell;
+    double load_s;
+} world;
+
+static double now_ms(void)
+{
+    struct timespec t;
+    (void)clock_gettime(CLOCK_MONOTONIC, &t);
+    return 1e3 * (double)t.tv_sec + 1e-6 * (double)t.tv_nsec;
+}
+
+/* ---- data ------------------------------------------------------------------------------------ */
+
+static uint32_t split(char *line, char *fields[COLUMNS])
+{
+    uint32_t count = 0;
+    for (char *at = strtok(line, ";\n"); at != NULL && count < COLUMNS; at = strtok(NULL, ";\n")) {
+        fields[count++] = at;
+    }
+    return count;
+}
+
+static void copy(char *to, size_t size, const char *from)
+{
+    (void)snprintf(to, size, "%s", from);
+}
+
+static void read_row(char *fields[COLUMNS], row *r)
+{
+    copy(r->table, sizeof r->table, fields[1]);
+    copy(r->label, sizeof r->label, fields[2]);
+    copy(r->scene, sizeof r->scene, fields[3]);
+    copy(r->place, sizeof r->place, fields[4]);
+    r->size = strtod(fields[5], NULL);
+    r->height = strtod(fields[6], NULL);
+    r->resolution = (uint32_t)strtoul(fields[7], NULL, 10);
+    r->umbrae = (uint32_t)strtoul(fields[8], NULL, 10);
+    r->outer = strtod(fields[9], NULL);
+    r->half = fields[10][0] == '1';
+    r->is_thesis = r->table[0] == '3';
+    for (int k = 0; k < 3; ++k) {
+        copy(r->theirs[k], sizeof r->theirs[k], fields[11 + k]);
+    }
+}
+
+static bool wanted(const study *s, const row *r)
+{
+    return s->only == NULL || strstr(r->table, s->only) != NULL || strstr(r->label, s->only) != NULL;
+}
+
+static bool read_line(study *s, char *line)
+{
+    char *fields[COLUMNS];
+    if (line[0] == '#' || line[0] == '\n') {
+        return true;
+    }
+    uint32_t count = split(line, fields);
+    if (count == 6 && strcmp(fields[0], "place") == 0 && s->place_count < MOST_PLACES) {
+        place *p = &s->places[s->place_count++];
+        copy(p->scene, sizeof p->scene, fields[1]);
+        copy(p->name, sizeof p->name, fields[2]);
+        for (int k = 0; k < 3; ++k) {
+            p->at[k] = strtod(fields[3 + k], NULL);
+        }
+        return true;
+    }
+    if (count == COLUMNS && strcmp(fields[0], "row") == 0 && s->row_count < MOST_ROWS) {
+        row *r = &s->rows[s->row_count];
+        memset(r, 0, sizeof *r);
+        read_row(fields, r);
+        s->row_count += wanted(s, r);
+        return true;
+    }
+    return false;
+}
+
+static bool read_data(study *s, const char *name)
+{
+    char line[512];
+    unsigned number = 0;
+    FILE *f = fopen(name, "r");
+    bool ok = f != NULL;
+    while (ok && fgets(line, sizeof line, f) != NULL) {
+        ++number;
+        ok = read_line(s, line);
+    }
+    if (f != NULL) {
+        (void)fclose(f);
+    }
+    if (!ok) {
+        (void)snprintf(s->error.text, sizeof s->error.text,
+                       "%.180s:%u: cannot be read: its head says what lines hold", name, number);
+    }
+    return ok;
+}
+
+/* ---- measuring ------------------------------------------------------------------------------- */
+
+static void world_free(world *w)
+{
+    region_result_free(&w->seen);
+    umb_region_destroy(w->region);
+    umb_index_destroy(w->index);
+    umb_scene_destroy(w->scene);
+    if (w->oracle != NULL) {
+        truth_destroy(w->oracle);
+    }
+    if (w->model != NULL) {
+        model_free(w->model);
+    }
+    memset(w, 0, sizeof *w);
+}
+
+/* False with no error: a real scene that is not there, or a scene that is too large. */
+static bool world_load(world *w, study *s, const char *scene)
+{
+    char name[512];
+    const char *folder = getenv("UMBRAGE_SCENES");
+    double start = now_ms();
+    if (strncmp(scene, "gen:", 4) == 0) {
+        copy(name, sizeof name, scene);
+    } else if (folder == NULL || folder[0] == '\0') {
+        return false;
+    } else {
+        (void)snprintf(name, sizeof name, "%s/%s", folder, scene);
+    }
+    w->model = model_load(name, NULL, &s->error);
+    if (w->model == NULL || (s->most != 0 && w->model->triangles > s->most)) {
+        return false;
+    }
+    umb_region_def def = {.error = &s->error};
+    w->scene = model_scene(w->model, true, (umb_tasks){0}, NULL, &s->error);
+    w->oracle = w->scene != NULL ? truth_create(w->model, &s->error) : NULL;
+    if (w->oracle == NULL || umb_index_create(w->scene, NULL, &w->index) != UMB_OK ||
+        umb_region_create(w->index, &def, &w->region) != UMB_OK) {
+        if (s->error.text[0] == '\0') {
+            copy(s->error.text, sizeof s->error.text, "not enough memory");
+        }
+        return false;
+    }
+    w->load_s = (now_ms() - start) / 1e3;
+    return true;
+}
+
+static int up_of(const model *m)
+{
+    return fabs(m->up[2]) > 0.5 ? 2 : fabs(m->up[1]) > 0.5 ? 1 : 0;
+}
+
+static bool make_query(const study *s, const world *w, const row *r, umb_region_query *q)
+{
+    static const umb_region_up ups[3] = {UMB_UP_X, UMB_UP_Y, UMB_UP_Z};
+    int up = up_of(w->model);
+    *q = (umb_region_query){.up = ups[up],
+                            .resolution = r->resolution,
+                            .umbrae = r->umbrae,
+                            .outer = r->outer,
+                            .half_umbra = r->half};
+    for (uint32_t k = 0; k < s->place_count; ++k) {
+        const place *p = &s->places[k];
+        if (strcmp(p->scene, r->scene) != 0 || strcmp(p->name, r->place) != 0) {
+            continue;
+        }
+        for (int i = 0; i < 3; ++i) {
+            double at = p->at[i] - w->model->origin[i];
+            q->min[i] = i == up ? at : at - 0.5 * r->size;
+            q->max[i] = i == up ? at + r->height : at + 0.5 * r->size;
+        }
+        return true;
+    }
+    return false;
+}
+
+static bool ask(study *s, world *w, const umb_region_query *q, answer *out, umb_region_answer *a)
+{
+    *out = (answer){.solve_ms = INFINITY, .refine_ms = INFINITY};
+    umb_result result = UMB_OK;
+    for (uint32_t k = 0; result == UMB_OK && k <= s->repeat; ++k) {
+        double start = now_ms();
+        result = umb_region_solve(w->region, q, a);
+        double solved = now_ms();
+        if (result == UMB_OK) {
+            result = umb_region_refine(w->region, 0, a);
+        }
+        double refined = now_ms();
+        if (k > 0) { /* the first one grows buffers */
+            out->solve_ms = fmin(out->solve_ms, solved - start);
+            out->refine_ms = fmin(out->refine_ms, refined - solved);
+        }
+    }
+    out->pvs = a->pvs_count;
+    out->refined = a->refined_count;
+    out->pvs_triangles = a->stats.pvs_triangles;
+    out->refined_triangles = a->stats.refined_triangles;
+    return result == UMB_OK;
+}
+
+static bool same_cell(const umb_region_query *a, const umb_region_query *b)
+{
+    return memcmp(a->min, b->min, sizeof a->min) == 0 && memcmp(a->max, b->max, sizeof a->max) == 0;
+}
+
+/* Rays from the cell; those of the last one if it is the same. */
+static bool look(study *s, world *w, const umb_region_query *q, const umb_region_answer *a)
+{
+    uint32_t objects = w->model->object_count;
+    if (w->seen.witness_of != NULL && same_cell(q, &w->cell)) {
+        return true;
+    }
+    region_result_free(&w->seen);
+    uint8_t *hidden = malloc((size_t)objects + 1), *shown = calloc((size_t)objects + 1, 1);
+    bool ok = hidden != NULL && shown != NULL;
+    if (ok) {
+        memset(hidden, 1, objects);
+        for (uint32_t k = 0; k < a->refined_count; ++k) {
+            hidden[a->refined[k]] = 0;
+            shown[a->refined[k]] = 1;
+        }
+        region_cell cell = {.near_distance = 0.0};
+        memcpy(cell.min, q->min, sizeof cell.min);
+        memcpy(cell.max, q->max, sizeof cell.max);
+        region_options options = {.rays = s->rays, .exhaust = true, .accused = hidden, .doubtful = shown};
+        ok = region_search(w->oracle, &cell, &options, &w->seen, &s->error);
+        w->cell = *q;
+    }
+    free(hidden);
+    free(shown);
+    return ok;
+}
+
+static bool was_seen(const world *w, uint32_t object)
+{
+    uint32_t first = w->seen.witness_of[object];
+    return first != MODEL_NONE && w->seen.witnesses[first].confirmed;
+}
+
+/* Seen objects that an ascending set lacks. */
+static uint32_t misses(const world *w, const uint32_t *ids, uint32_t count)
+{
+    uint32_t at = 0, lacking = 0;
+    for (uint32_t i = 0; i < w->model->object_count; ++i) {
+        while (at < count && ids[at] < i) {
+            ++at;
+        }
+        lacking += was_seen(w, i) && (at == count || ids[at] != i);
+    }
+    return lacking;
+}
+
+static bool measure(study *s, world *w, row *r)
+{
+    umb_region_query q;
+    umb_region_answer a;
+    if (!make_query(s, w, r, &q)) {
+        (void)snprintf(s->error.text, sizeof s->error.text, "%s has no place %s", r->scene, r->place);
+        return false;
+    }
+    if (!ask(s, w, &q, &r->ours, &a) || !look(s, w, &q, &a)) {
+        return false;
+    }
+    r->ours.misses = misses(w, a.pvs, a.pvs_count) + misses(w, a.refined, a.refined_count);
+    if (r->is_thesis) {
+        q.outer = 2.0;
+        q.umbrae = 1;
+        if (!ask(s, w, &q, &r->thesis, &a)) {
+            return false;
+        }
+        r->thesis.misses = misses(w, a.pvs, a.pvs_count);
+    }
+    r->seen = w->seen.seen_objects;
+    r->met = w->seen.seen_triangles;
+    r->rays = w->seen.rays;
+    for (uint32_t i = 0; i < w->model->object_count; ++i) {
+        const model_object *o = &w->model->objects[i];
+        r->seen_triangles += was_seen(w, i) ? w->model->meshes[o->mesh].triangle_count : 0;
+    }
+    r->done = true;
+    (void)fprintf(stderr, "%s %s: %.1f + %.1f ms, pvs %u, refined %u, seen %u, misses %u\n", r->table,
+                  r->label, r->ours.solve_ms, r->ours.refine_ms, r->ours.pvs, r->ours.refined, r->seen,
+                  r->ours.misses + r->thesis.misses);
+    return true;
+}
+
+/* All rows of a scene, one load each. */
+static bool measure_all(study *s)
+{
+    for (uint32_t i = 0; i < s->row_count; ++i) {
+        world w = {0};
+        bool first = true;
+        for (uint32_t k = 0; k < i; ++k) {
+            first = first && strcmp(s->rows[k].scene, s->rows[i].scene) != 0;
+        }
+        if (!first) {
+            continue;
+        }
+        bool ok = world_load(&w, s, s->rows[i].scene), bad = s->error.text[0] != '\0';
+        if (ok) {
+            (void)fprintf(stderr, "%s: loaded in %.1f s\n", s->rows[i].scene, w.load_s);
+        }
+        for (uint32_t k = i; ok && k < s->row_count; ++k) {
+            if (strcmp(s->rows[k].scene, s->rows[i].scene) == 0 && !measure(s, &w, &s->rows[k])) {
+                ok = false;
+                bad = true;
+            }
+        }
+        world_free(&w);
+        if (bad) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* ---- printing -------------------------------------------------------------------------------- */
+
+static double over(double a, double b)
+{
+    return b > 0.0 ? a / b : NAN;
+}
+
+static void print_thesis_row(const row *r)
+{
+    double pvs = strtod(r->theirs[1], NULL), vs = strtod(r->theirs[2], NULL);
+    printf("| %s | %s | %s | %s | %.2f | %.1f | %" PRIu64 " | %.1f | %.1f | %" PRIu64 " | %" PRIu64
+           " | %" PRIu64 " | %" PRIu64 " | %.2f | %.2f | %u |\n",
+           r->label, r->theirs[0], r->theirs[1], r->theirs[2], over(pvs, vs), r->thesis.solve_ms,
+           r->thesis.pvs_triangles, r->ours.solve_ms, r->ours.refine_ms, r->ours.pvs_triangles,
+           r->ours.refined_triangles, r->seen_triangles, r->met,
+           over((double)r->ours.pvs_triangles, (double)r->ours.refined_triangles),
+           over((double)r->ours.refined_triangles, (double)r->seen_triangles),
+           r->ours.misses + r->thesis.misses);
+}
+
+static void print_row(const row *r)
+{
+    printf("| %s | %.1f | %.1f | %u | %u | %u | %" PRIu64 " | %" PRIu64 " | %" PRIu64 " | %.2f | %.2f | %u |\n",
+           r->label, r->ours.solve_ms, r->ours.refine_ms, r->ours.pvs, r->ours.refined, r->seen,
+           r->ours.pvs_triangles, r->ours.refined_triangles, r->seen_triangles,
+           over(r->ours.pvs, r->ours.refined), over(r->ours.refined, r->seen),
+           r->ours.misses + r->thesis.misses);
+}
+
+static void print_table(const study *s, const char *table)
+{
+    printf("\n### %s%s\n\n", table[0] == '3' ? "Table " : "By ", table);
+    if (table[0] == '3') {
+        puts("| cell | thesis: s | PVS | VS | PVS/VS | its mode here: ms | PVS | here: ms | refine ms | PVS | "
+             "refined | seen | met | PVS/refined | refined/seen | misses |");
+        puts("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|");
+        for (uint32_t i = 0; i < s->row_count; ++i) {
+            if (s->rows[i].done && strcmp(s->rows[i].table, table) == 0) {
+                print_thesis_row(&s->rows[i]);
+            }
+        }
+        puts("");
+    }
+    puts("| | ms | refine ms | PVS objects | refined | seen | PVS triangles | refined | seen | PVS/refined, "
+         "objects | refined/seen | misses |");
+    puts("|---|---|---|---|---|---|---|---|---|---|---|---|");
+    for (uint32_t i = 0; i < s->row_count; ++i) {
+        if (s->rows[i].done && strcmp(s->rows[i].table, table) == 0) {
+            print_row(&s->rows[i]);
+        }
+    }
+}
+
+/* Two plots of a sweep: times, and sizes of sets in objects. */
+static bool plot_table(study *s, const char *table)
+{
+    static const svg_dots_series times[] = {{"occlusion maps", "#1f6feb", false},
+                                            {"refinement", "#d9822b", false}};
+    static const svg_dots_series sizes[] = {{"seen by a ray", "#1f8a85", false},
+                                            {"refined", "#d9822b", false},
+                                            {"PVS", "#1f6feb", false}};
+    const char *labels[MOST_ROWS];
+    svg_dots_dot time_dots[2 * MOST_ROWS], size_dots[3 * MOST_ROWS];
+    uint32_t lines = 0;
+    for (uint32_t i = 0; i < s->row_count; ++i) {
+        const row *r = &s->rows[i];
+        if (!r->done || strcmp(r->table, table) != 0) {
+            continue;
+        }
+        labels[lines] = r->label;
+        time_dots[2 * lines] = (svg_dots_dot){lines, 0, fmax(r->ours.solve_ms, 1e-3), false};
+        time_dots[2 * lines + 1] = (svg_dots_dot){lines, 1, fmax(r->ours.refine_ms, 1e-3), false};
+        size_dots[3 * lines] = (svg_dots_dot){lines, 0, fmax(r->seen, 0.5), false};
+        size_dots[3 * lines + 1] = (svg_dots_dot){lines, 1, fmax(r->ours.refined, 0.5), false};
+        size_dots[3 * lines + 2] = (svg_dots_dot){lines, 2, fmax(r->ours.pvs, 0.5), false};
+        ++lines;
+    }
+    char title[96], name[300];
+    svg_dots plot = {title, "ms", labels, lines, times, 2, time_dots, 2 * lines};
+    (void)snprintf(title, sizeof title, "One view cell, by %s: milliseconds on one core", table);
+    (void)snprintf(name, sizeof name, "%.200s/region-%s-time.svg", s->plots, table);
+    if (lines == 0 || !svg_dots_write(&plot, name, &s->error)) {
+        return lines == 0;
+    }
+    plot = (svg_dots){title, "objects", labels, lines, sizes, 3, size_dots, 3 * lines};
+    (void)snprintf(title, sizeof title, "One view cell, by %s: objects in the sets", table);
+    (void)snprintf(name, sizeof name, "%.200s/region-%s-size.svg", s->plots, table);
+    return svg_dots_write(&plot, name, &s->error);
+}
+
+static bool print_all(study *s)
+{
+    for (uint32_t i = 0; i < s->row_count; ++i) {
+        bool first = s->rows[i].done;
+        for (uint32_t k = 0; k < i; ++k) {
+            first = first && !(s->rows[k].done && strcmp(s->rows[k].table, s->rows[i].table) == 0);
+        }
+        if (!first) {
+            continue;
+        }
+        print_table(s, s->rows[i].table);
+        if (s->plots != NULL && !s->rows[i].is_thesis && !plot_table(s, s->rows[i].table)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static uint64_t number_of(const char *text)
+{
+    char *end;
+    double value = strtod(text, &end);
+    return (uint64_t)(value * (*end == 'M' ? 1e6 : *end == 'k' ? 1e3 : 1.0));
+}
+
+static bool read_settings(int count, char **words, study *s)
+{
+    s->rays = 2000000;
+    s->repeat = 3;
+    for (int i = 2; i + 1 < count; i += 2) {
+        if (strcmp(words[i], "--only") == 0) {
+            s->only = words[i + 1];
+        } else if (strcmp(words[i], "--plots") == 0) {
+            s->plots = words[i + 1];
+        } else if (strcmp(words[i], "--rays") == 0) {
+            s->rays = number_of(words[i + 1]);
+        } else if (strcmp(words[i], "--most") == 0) {
+            s->most = number_of(words[i + 1]);
+        } else if (strcmp(words[i], "--repeat") == 0) {
+            s->repeat = (uint32_t)number_of(words[i + 1]);
+        } else {
+            return false;
+        }
+    }
+    return count % 2 == 0 && s->rays != 0 && s->repeat != 0;
+}
+
+int main(int count, char **words)
+{
+    static study s;
+    double start = now_ms();
+    if (!read_settings(count, words, &s)) {
+        (void)fprintf(stderr, "bench_region: the head of bench/bench_region.c says how it is used\n");
+        return 2;
+    }
+    if (!read_data(&s, words[1]) || !measure_all(&s) || !print_all(&s)) {
+        (void)fprintf(stderr, "bench_region: %s\n", s.error.text);
+        return 3;
+    }
+    uint32_t missed = 0;
+    for (uint32_t i = 0; i < s.row_count; ++i) {
+        missed += s.rows[i].ours.misses + s.rows[i].thesis.misses;
+    }
+    printf("\n%u misses; the study took %.0f seconds.\n", missed, (now_ms() - start) / 1e3);
+    return missed != 0;
+}
