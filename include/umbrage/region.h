@@ -90,6 +90,22 @@ UMB_API umb_result umb_region_solve(umb_region *region, const umb_region_query *
  * no memory. */
 UMB_API umb_result umb_region_refine(umb_region *region, uint32_t effort, umb_region_answer *out);
 
+/* What an occlusion map holds for the rays of one pixel: beyond what blocks them, everything is hidden whose slopes
+ * (height over horizontal distance, as all points of the cell see it) lie between bottom and top. */
+typedef struct umb_region_pixel {
+    float bottom, top; /* of the interval that reaches highest; INFINITY and -INFINITY: nothing is hidden.
+                          -INFINITY, top: nothing passes below */
+    bool live;         /* some ray of the method goes through the pixel */
+} umb_region_pixel;
+
+/* Copy an occlusion map after the last umb_region_solve, to look at: *side rows by where rays cross the inner square (or
+ * their offset from the cell's middle), each of *side pixels by where they cross the outer one (or their slope). Maps are numbered from 0:
+ * of the rays towards + and - of the axis after up (x, y, z, x), then of the one after that; with squares four more, of
+ * the rays that leave the cell sideways. Returns false, with the size only, when pixels is NULL or capacity is too
+ * small; with side 0 when there is no such map. */
+UMB_API bool umb_region_read_map(const umb_region *region, uint32_t map, umb_region_pixel *pixels, size_t capacity,
+                                 uint32_t *side);
+
 #ifdef __cplusplus
 }
 #endif

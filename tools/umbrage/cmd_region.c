@@ -7,6 +7,7 @@
 #include "part_file.h"
 #include "progress.h"
 #include "region_check.h"
+#include "region_picture.h"
 
 /* The vertical is one of the axes here. */
 static int read_axis(const options *o, const double up[3], umb_region_up *out)
@@ -119,19 +120,17 @@ static umb_result solve(const options *o, umb_region *region, const umb_region_q
     return result;
 }
 
-static int paint(const setup *s, const options *o, const umb_region_query *q, const report *r)
+static int paint(const setup *s, const options *o, const umb_region *region, const umb_region_query *q,
+                 const report *r)
 {
     bitmap im = {0};
-    double cell[2][3];
-    memcpy(cell[0], q->min, sizeof cell[0]);
-    memcpy(cell[1], q->max, sizeof cell[1]);
     uint8_t *states = malloc((size_t)s->model->object_count + 1);
     int code = EXIT_DONE;
     if (states != NULL) {
         region_check_states(&r->check, r->answer, s->model, states);
     }
     if (states == NULL || !bitmap_create(&im, o->width, o->height) ||
-        !picture_cell_map(&im, s->model, (const double(*)[3])cell, states)) {
+        !region_picture(&im, s->model, region, q, states)) {
         code = fail(o, EXIT_INPUT, "not enough memory for the picture");
     } else {
         code = part_file_picture(o, &im, o->output);
@@ -154,7 +153,7 @@ static int answer(const setup *s, const options *o, umb_region *region, const um
         code = options_given(o, "json") ? print_json(s, o, &r) : print_text(s, o, &r);
     }
     if (code == EXIT_DONE && options_given(o, "picture")) {
-        code = paint(s, o, query, &r);
+        code = paint(s, o, region, query, &r);
     }
     if (code == EXIT_DONE) {
         code = region_check_code(&r.check);

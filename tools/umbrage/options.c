@@ -498,7 +498,7 @@ static const option_spec specs[] = {
     {"capture", 0, BIT(CULL), "FILE", read_capture, "write the frame for umbrage replay"},
     {"grid", 0, BIT(CHECK) | BIT(EXPLAIN), "WxH", read_grid,
      "first rays of the oracle (default: --size)"},
-    {"picture", 0, BIT(REGION), "FILE", read_output, "write a picture of the scene from above, by what the cell sees"},
+    {"picture", 0, BIT(REGION), "FILE", read_output, "write a picture of the scene from above and the occlusion maps"},
     {"check", 0, BIT(REGION), NULL, read_flag, "hold the answer against many rays from the cell"},
     {"rays", 0, BIT(CHECK) | BIT(EXPLAIN) | BIT(REGION), "N", read_rays,
      "most guided rays a view (default 4M); from a cell 0.5M, to check 4M"},
