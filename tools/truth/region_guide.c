@@ -11,7 +11,7 @@
 
 #include "region_hunt.h"
 
-enum { EDGE_SAMPLES = 3, HALVINGS = 3, SLIPS = 3, TARGET_TRIES = 2, SCANNED = 64 };
+enum { EDGE_SAMPLES = 3, HALVINGS = 3, SLIPS = 3, TARGET_TRIES = 2, SCANNED = 16 };
 
 static double unit(uint64_t random, uint64_t which)
 {
