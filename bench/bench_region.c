@@ -284,7 +284,8 @@ static bool look(study *s, world *w, const umb_region_query *q, const umb_region
         region_cell cell = {.near_distance = 0.0};
         memcpy(cell.min, q->min, sizeof cell.min);
         memcpy(cell.max, q->max, sizeof cell.max);
-        region_options options = {.rays = s->rays, .exhaust = true, .accused = hidden, .doubtful = shown};
+        region_options options = {
+            .rays = s->rays, .exhaust = true, .accused = hidden, .doubtful = shown};
         ok = region_search(w->oracle, &cell, &options, &w->seen, &s->error);
         w->cell = *q;
     }
@@ -317,7 +318,8 @@ static bool measure(study *s, world *w, row *r)
     umb_region_query q;
     umb_region_answer a;
     if (!make_query(s, w, r, &q)) {
-        (void)snprintf(s->error.text, sizeof s->error.text, "%s has no place %s", r->scene, r->place);
+        (void)snprintf(s->error.text, sizeof s->error.text, "%s has no place %s", r->scene,
+                       r->place);
         return false;
     }
     if (!ask(s, w, &q, &r->ours, &a) || !look(s, w, &q, &a)) {
@@ -340,9 +342,9 @@ static bool measure(study *s, world *w, row *r)
         r->seen_triangles += was_seen(w, i) ? w->model->meshes[o->mesh].triangle_count : 0;
     }
     r->done = true;
-    (void)fprintf(stderr, "%s %s: %.1f + %.1f ms, pvs %u, refined %u, seen %u, misses %u\n", r->table,
-                  r->label, r->ours.solve_ms, r->ours.refine_ms, r->ours.pvs, r->ours.refined, r->seen,
-                  r->ours.misses + r->thesis.misses);
+    (void)fprintf(stderr, "%s %s: %.1f + %.1f ms, pvs %u, refined %u, seen %u, misses %u\n",
+                  r->table, r->label, r->ours.solve_ms, r->ours.refine_ms, r->ours.pvs,
+                  r->ours.refined, r->seen, r->ours.misses + r->thesis.misses);
     return true;
 }
 
@@ -398,7 +400,8 @@ static void print_thesis_row(const row *r)
 
 static void print_row(const row *r)
 {
-    printf("| %s | %.1f | %.1f | %u | %u | %u | %" PRIu64 " | %" PRIu64 " | %" PRIu64 " | %.2f | %.2f | %u |\n",
+    printf("| %s | %.1f | %.1f | %u | %u | %u | %" PRIu64 " | %" PRIu64 " | %" PRIu64
+           " | %.2f | %.2f | %u |\n",
            r->label, r->ours.solve_ms, r->ours.refine_ms, r->ours.pvs, r->ours.refined, r->seen,
            r->ours.pvs_triangles, r->ours.refined_triangles, r->seen_triangles,
            over(r->ours.pvs, r->ours.refined), over(r->ours.refined, r->seen),
@@ -409,7 +412,8 @@ static void print_table(const study *s, const char *table)
 {
     printf("\n### %s%s\n\n", table[0] == '3' ? "Table " : "By ", table);
     if (table[0] == '3') {
-        puts("| cell | thesis: s | PVS | VS | PVS/VS | its mode here: ms | PVS | here: ms | refine ms | PVS | "
+        puts("| cell | thesis: s | PVS | VS | PVS/VS | its mode here: ms | PVS | here: ms | refine "
+             "ms | PVS | "
              "refined | seen | met | PVS/refined | refined/seen | misses |");
         puts("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|");
         for (uint32_t i = 0; i < s->row_count; ++i) {
@@ -419,7 +423,8 @@ static void print_table(const study *s, const char *table)
         }
         puts("");
     }
-    puts("| | ms | refine ms | PVS objects | refined | seen | PVS triangles | refined | seen | PVS/refined, "
+    puts("| | ms | refine ms | PVS objects | refined | seen | PVS triangles | refined | seen | "
+         "PVS/refined, "
          "objects | refined/seen | misses |");
     puts("|---|---|---|---|---|---|---|---|---|---|---|---|");
     for (uint32_t i = 0; i < s->row_count; ++i) {
@@ -518,7 +523,8 @@ int main(int count, char **words)
     static study s;
     double start = now_ms();
     if (!read_settings(count, words, &s)) {
-        (void)fprintf(stderr, "bench_region: the head of bench/bench_region.c says how it is used\n");
+        (void)fprintf(stderr,
+                      "bench_region: the head of bench/bench_region.c says how it is used\n");
         return 2;
     }
     if (!read_data(&s, words[1]) || !measure_all(&s) || !print_all(&s)) {

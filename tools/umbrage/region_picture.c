@@ -106,8 +106,8 @@ static void lay_out(const bitmap *im, uint32_t maps, panels *p, uint32_t *width,
     }
 }
 
-bool region_picture(bitmap *im, const model *m, const umb_region *region, const umb_region_query *query,
-                    const uint8_t *states)
+bool region_picture(bitmap *im, const model *m, const umb_region *region,
+                    const umb_region_query *query, const uint8_t *states)
 {
     double cell[2][3];
     bitmap scene = {0};
