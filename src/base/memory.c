@@ -1,3 +1,8 @@
+#if defined(__linux__)
+#define _DEFAULT_SOURCE /* madvise */
+#include <sys/mman.h>
+#endif
+
 #include "memory.h"
 
 #include <stdarg.h>
@@ -6,6 +11,28 @@
 #include <string.h>
 
 #define ALIGNMENT 64u
+/* Blocks of at least LARGE bytes are asked for in pages of this size: a walk looks here and there into trees and lists
+ * of a million objects, and would look up a page each time. */
+#define LARGE_PAGE ((size_t)1 << 21)
+#define LARGE (2 * LARGE_PAGE)
+
+/* NULL without memory. */
+static void *allocate(size_t size)
+{
+    size_t alignment = size >= LARGE ? LARGE_PAGE : ALIGNMENT;
+    if (size > SIZE_MAX - alignment) {
+        return NULL;
+    }
+    /* aligned_alloc wants a multiple of the alignment. */
+    size_t whole = (size + alignment - 1) & ~(alignment - 1);
+    void *p = aligned_alloc(alignment, whole);
+#if defined(MADV_HUGEPAGE)
+    if (p != NULL && size >= LARGE) {
+        (void)madvise(p, whole, MADV_HUGEPAGE); /* a wish */
+    }
+#endif
+    return p;
+}
 
 static void *default_reallocate(void *user, void *old, size_t old_size, size_t new_size)
 {
@@ -14,11 +41,7 @@ static void *default_reallocate(void *user, void *old, size_t old_size, size_t n
         free(old);
         return NULL;
     }
-    if (new_size > SIZE_MAX - ALIGNMENT) {
-        return NULL;
-    }
-    /* aligned_alloc wants a multiple of the alignment; realloc would lose the alignment. */
-    void *p = aligned_alloc(ALIGNMENT, (new_size + ALIGNMENT - 1) & ~(size_t)(ALIGNMENT - 1));
+    void *p = allocate(new_size); /* realloc would lose the alignment */
     if (p != NULL && old != NULL) {
         memcpy(p, old, old_size < new_size ? old_size : new_size);
         free(old);
