@@ -121,6 +121,29 @@ static inline void add_faces(umb_convex *out, const umb_raster_map *m, const box
     }
 }
 
+/* Upright lines are bounds of columns, and need not be looked at in every row. */
+static inline void fold_upright(umb_convex *v)
+{
+    umb_convex_lines *l = &v->left, *r = &v->right;
+    uint32_t left = 0, right = 0;
+    for (uint32_t i = 0; i < l->count; ++i) {
+        double at = l->slope[i] == 0.0 ? l->in_at[i] : v->x_min;
+        v->x_min = at > v->x_min ? at : v->x_min;
+        l->slope[left] = l->slope[i];
+        l->in_at[left] = l->in_at[i];
+        left += l->slope[i] != 0.0;
+    }
+    for (uint32_t i = 0; i < r->count; ++i) {
+        double at = r->slope[i] == 0.0 ? r->in_at[i] : v->x_max;
+        v->x_max = at < v->x_max ? at : v->x_max;
+        r->slope[right] = r->slope[i];
+        r->in_at[right] = r->in_at[i];
+        right += r->slope[i] != 0.0;
+    }
+    l->count = left;
+    r->count = right;
+}
+
 static umb_convex_result find_box(const umb_raster_map *m, const umb_aabb *box, umb_convex *out)
 {
     box_corners c;
@@ -146,6 +169,10 @@ static umb_convex_result find_box(const umb_raster_map *m, const umb_aabb *box, 
         from = to;
     }
     if (!umb_convex_place(out, m, &frame, c.x_min, c.x_max)) {
+        return UMB_CONVEX_NOTHING;
+    }
+    fold_upright(out);
+    if (!(out->x_max > out->x_min)) {
         return UMB_CONVEX_NOTHING;
     }
     out->most = (float)(c.most + 0x1p-22 * fabs(c.most));

@@ -96,22 +96,32 @@ UMB_INLINE bool small_hidden(const umb_coverage *c, const tile_rect *t, float ne
     return !umb_iv_any(open);
 }
 
+/* The tiles of a row that are open, bit 0 for the one at base. */
+static bool row_hidden(const umb_coverage *c, const tile_rect *t, uint32_t ty, uint32_t base, uint32_t open,
+                       float nearness)
+{
+    const umb_tile *row = c->tiles + (size_t)ty * c->columns;
+    asked_rows rows = ask_rows(ty == t->ty0 ? t->r0 : 0, ty == t->ty1 ? t->r1 : UMB_TILE_HEIGHT - 1);
+    for (; open != 0; open &= open - 1) {
+        uint32_t tx = base + (uint32_t)__builtin_ctz(open);
+        uint32_t need = (tx == t->tx0 ? t->first : ~0u) & (tx == t->tx1 ? t->last : ~0u);
+        if (umb_iv_any(open_lanes(&row[tx], &rows, need, nearness))) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Eight columns of tiles at a time: rows of them that are closed by something nearer are passed over quickly. */
 static bool large_hidden(const umb_coverage *c, const tile_rect *t, float nearness)
 {
-    for (uint32_t ty = t->ty0; ty <= t->ty1; ++ty) {
-        const umb_tile *row = c->tiles + (size_t)ty * c->columns;
-        const float *coarse = c->coarse + (size_t)ty * c->columns;
-        int32_t r0 = ty == t->ty0 ? t->r0 : 0, r1 = ty == t->ty1 ? t->r1 : UMB_TILE_HEIGHT - 1;
-        for (uint32_t base = t->tx0; base <= t->tx1; base += 8) {
-            uint32_t count = t->tx1 - base + 1;
-            uint32_t open = open_eight(coarse + base, nearness) & low_mask(count < 8 ? (int32_t)count : 8);
-            for (; open != 0; open &= open - 1) {
-                uint32_t tx = base + (uint32_t)__builtin_ctz(open);
-                uint32_t need = (tx == t->tx0 ? t->first : ~0u) & (tx == t->tx1 ? t->last : ~0u);
-                asked_rows rows = ask_rows(r0, r1);
-                if (umb_iv_any(open_lanes(&row[tx], &rows, need, nearness))) {
-                    return false;
-                }
+    for (uint32_t base = t->tx0; base <= t->tx1; base += 8) {
+        uint32_t count = t->tx1 - base + 1, columns = low_mask(count < 8 ? (int32_t)count : 8);
+        const float *coarse = c->coarse + (size_t)t->ty0 * c->columns + base;
+        for (uint32_t ty = t->ty0; ty <= t->ty1; ++ty, coarse += c->columns) {
+            uint32_t open = open_eight(coarse, nearness) & columns;
+            if (open != 0 && !row_hidden(c, t, ty, base, open, nearness)) {
+                return false;
             }
         }
     }
