@@ -1,0 +1,356 @@
+/* Every index by every rule over the same boxes: what building takes, what it holds, and what culling costs, without
+ * occlusion and with it, as a table in Markdown. At last the default beside Embree's hierarchy over the same boxes.
+ *
+ *     bench_index [MOST [ROUNDS [SET]]]
+ *
+ * MOST: the largest number of objects (1000, 10000, 100000 or 1000000; default 100000). SET: uniform or clustered; without
+ * it, both. All objects are boxes that hide. Times are processor time, of one thread, the least of the rounds; culling is
+ * the mean over 32 views. BSP trees have twelve triangles an object, so they stop at 100,000 objects.
+ */
+#include <embree3/rtcore.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "index/bvh.h"
+#include "index/cut.h"
+#include "index/tree.h"
+#include "umbrage/umbrage.h"
+
+enum { VIEWS = 32, MOST_TRIANGLES = 100000 };
+
+static double now_ms(void)
+{
+    struct timespec t;
+    (void)clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+    return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
+}
+
+/* ---- scenes --------------------------------------------------------------------------------- */
+
+static double dice(uint64_t *state)
+{
+    *state = *state * 6364136223846793005u + 1442695040888963407u;
+    return (double)(*state >> 11) * 0x1p-53;
+}
+
+/* A unit cube, fronts outwards. */
+static umb_result add_cube(umb_scene *scene, umb_shape *out)
+{
+    static const float p[24] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0, 0, 0, 1, 1, 0, 1, 0, 1, 1, 1, 1, 1};
+    static const uint32_t t[36] = {0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4,
+                                   2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5};
+    umb_shape_def def = {.positions = p, .position_count = 8, .indices = t, .index_count = 36};
+    return umb_scene_add_shape(scene, &def, out);
+}
+
+/* So large that objects are as dense whatever their number: 1 in 8 units of volume, or around points, of which there is one
+ * for a thousand. Sides of 0.2 to 1, one box in sixteen three times as large. */
+static umb_scene *make_scene(uint32_t count, bool clustered, double *reach)
+{
+    umb_scene *scene = NULL;
+    umb_shape cube = 0;
+    uint64_t seed = 7 + clustered;
+    *reach = cbrt(8.0 * count);
+    if (umb_scene_create(NULL, &scene) != UMB_OK || add_cube(scene, &cube) != UMB_OK) {
+        return NULL;
+    }
+    double middle[3] = {0, 0, 0};
+    for (uint32_t i = 0; i < count; ++i) {
+        umb_object_def def = {.shape = cube, .flags = UMB_OBJECT_IS_SHAPE};
+        double size = i % 16 == 0 ? 3.0 : 1.0;
+        for (int a = 0; a < 3; ++a) {
+            if (i % 1000 == 0) {
+                middle[a] = *reach * dice(&seed);
+            }
+            double near_to = dice(&seed) + dice(&seed) + dice(&seed) + dice(&seed) - 2.0;
+            double at = clustered ? middle[a] + 6.0 * near_to : *reach * dice(&seed);
+            def.transform.m[a][a] = (float)(size * (0.2 + 0.8 * dice(&seed)));
+            def.transform.m[a][3] = (float)at;
+        }
+        uint32_t id;
+        if (umb_scene_add_object(scene, &def, &id) != UMB_OK) {
+            return NULL;
+        }
+    }
+    return umb_scene_commit(scene) == UMB_OK ? scene : NULL;
+}
+
+/* From within the scene to all sides. */
+static bool make_views(double reach, umb_view views[VIEWS])
+{
+    uint64_t seed = 3;
+    static const double up[3] = {0, 1, 0};
+    for (int k = 0; k < VIEWS; ++k) {
+        double eye[3], target[3];
+        for (int a = 0; a < 3; ++a) {
+            eye[a] = reach * dice(&seed);
+            target[a] = reach * dice(&seed);
+        }
+        if (umb_view_look_at(&views[k], eye, target, up, 1.0, 16.0 / 9.0, 0.1, 2.0 * reach) != UMB_OK) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* ---- one index ------------------------------------------------------------------------------ */
+
+typedef struct figures {
+    umb_index_stats stats;
+    double build_ms, frustum_ms, raster_ms;
+    double in_frustum, visible; /* objects a view */
+} figures;
+
+static bool time_views(const umb_index *index, umb_method method, const umb_view views[VIEWS], int rounds, double *ms,
+                       double *found)
+{
+    umb_culler *culler = NULL;
+    umb_culler_def def = {.method = method, .unordered = method == UMB_METHOD_NONE};
+    bool ok = umb_culler_create(index, &def, &culler) == UMB_OK;
+    *ms = INFINITY;
+    for (int round = 0; round <= rounds && ok; ++round) { /* the first one is not timed */
+        double begin = now_ms();
+        *found = 0.0;
+        for (int k = 0; k < VIEWS && ok; ++k) {
+            umb_visible_set seen;
+            ok = umb_cull(culler, &views[k], &seen) == UMB_OK;
+            *found += seen.count / (double)VIEWS;
+        }
+        *ms = round > 0 ? fmin(*ms, (now_ms() - begin) / VIEWS) : *ms;
+    }
+    umb_culler_destroy(culler);
+    return ok;
+}
+
+static bool measure(umb_scene *scene, const char *name, const umb_view views[VIEWS], int rounds, figures *out)
+{
+    umb_index *index = NULL;
+    umb_index_def def = {0};
+    bool ok = umb_index_parse(name, &def);
+    out->build_ms = INFINITY;
+    for (int round = 0; round < rounds && ok; ++round) {
+        umb_index_destroy(index);
+        index = NULL;
+        double begin = now_ms();
+        ok = umb_index_create(scene, &def, &index) == UMB_OK;
+        out->build_ms = fmin(out->build_ms, now_ms() - begin);
+    }
+    if (ok) {
+        umb_index_get_stats(index, &out->stats);
+        ok = time_views(index, UMB_METHOD_NONE, views, rounds, &out->frustum_ms, &out->in_frustum) &&
+             time_views(index, UMB_METHOD_RASTER, views, rounds, &out->raster_ms, &out->visible);
+    }
+    umb_index_destroy(index);
+    return ok;
+}
+
+static bool measure_all(uint32_t count, bool clustered, int rounds)
+{
+    umb_view views[VIEWS];
+    double reach;
+    umb_scene *scene = make_scene(count, clustered, &reach);
+    bool ok = scene != NULL && make_views(reach, views);
+    const char *name;
+    printf("\n%u objects, %s\n\n| index | build ms | MiB | slots an object | nodes | cost | frustum ms | in frustum | "
+           "raster ms | reported |\n|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n",
+           count, clustered ? "clustered" : "uniform");
+    for (uint32_t k = 0; (name = umb_index_variant(k)) != NULL && ok; ++k) {
+        figures f;
+        if (count > MOST_TRIANGLES && strncmp(name, "bsp", 3) == 0) {
+            continue;
+        }
+        ok = measure(scene, name, views, rounds, &f);
+        if (ok) {
+            printf("| %s | %.2f | %.2f | %.2f | %u | %.1f | %.4f | %.0f | %.4f | %.1f |\n", name, f.build_ms,
+                   (double)f.stats.bytes / 1048576.0, f.stats.slots / (double)f.stats.items, f.stats.nodes,
+                   f.stats.cost, f.frustum_ms, f.in_frustum, f.raster_ms, f.visible);
+            (void)fflush(stdout);
+        }
+    }
+    umb_scene_destroy(scene);
+    return ok;
+}
+
+/* ---- beside Embree -------------------------------------------------------------------------- */
+
+static void bounds_of(const struct RTCBoundsFunctionArguments *args)
+{
+    const umb_aabb *b = (const umb_aabb *)args->geometryUserPtr + args->primID;
+    *args->bounds_o = (struct RTCBounds){b->min[0], b->min[1], b->min[2], 0, b->max[0], b->max[1], b->max[2], 0};
+}
+
+/* The time to commit a scene of user geometry, medium quality. */
+static double time_embree(RTCDevice device, const umb_aabb *boxes, uint32_t count)
+{
+    RTCScene scene = rtcNewScene(device);
+    RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
+    rtcSetGeometryUserPrimitiveCount(geometry, count);
+    rtcSetGeometryUserData(geometry, (void *)(uintptr_t)boxes);
+    rtcSetGeometryBoundsFunction(geometry, bounds_of, NULL);
+    rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_MEDIUM);
+    rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_MEDIUM);
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometry(scene, geometry);
+    double begin = now_ms();
+    rtcCommitScene(scene);
+    double ms = now_ms() - begin;
+    rtcReleaseGeometry(geometry);
+    rtcReleaseScene(scene);
+    return ms;
+}
+
+/* A node of Embree's builder as its callbacks tell it: so many boxes, each node's with what is below. */
+typedef struct mirror {
+    uint32_t count;
+    bool leaf;
+    struct RTCBounds bounds[8];
+    struct mirror *child[8];
+} mirror;
+
+static void *make_node(RTCThreadLocalAllocator a, unsigned int count, void *user)
+{
+    (void)user;
+    mirror *m = rtcThreadLocalAlloc(a, sizeof *m, 16);
+    m->count = count;
+    m->leaf = false;
+    return m;
+}
+
+static void set_children(void *node, void **children, unsigned int count, void *user)
+{
+    (void)user;
+    for (unsigned int k = 0; k < count; ++k) {
+        ((mirror *)node)->child[k] = children[k];
+    }
+}
+
+static void set_bounds(void *node, const struct RTCBounds **bounds, unsigned int count, void *user)
+{
+    (void)user;
+    for (unsigned int k = 0; k < count; ++k) {
+        ((mirror *)node)->bounds[k] = *bounds[k];
+    }
+}
+
+static void *make_leaf(RTCThreadLocalAllocator a, const struct RTCBuildPrimitive *primitives, size_t count, void *user)
+{
+    (void)primitives;
+    mirror *m = make_node(a, (unsigned int)count, user);
+    m->leaf = true;
+    return m;
+}
+
+static double area_of(const struct RTCBounds *b)
+{
+    const float min[3] = {b->lower_x, b->lower_y, b->lower_z}, max[3] = {b->upper_x, b->upper_y, b->upper_z};
+    return umb_half_area(min, max);
+}
+
+/* Boxes tested by a random ray that meets the root: umb_index_stats.cost. */
+static double cost_below(const mirror *m, double area)
+{
+    double cost = area * m->count;
+    for (uint32_t k = 0; k < m->count && !m->leaf; ++k) {
+        cost += cost_below(m->child[k], area_of(&m->bounds[k]));
+    }
+    return cost;
+}
+
+static double cost_of_embree(RTCDevice device, const umb_aabb *boxes, uint32_t count)
+{
+    struct RTCBuildPrimitive *p = aligned_alloc(32, count * sizeof *p);
+    RTCBVH bvh = rtcNewBVH(device);
+    struct RTCBounds all = {INFINITY, INFINITY, INFINITY, 0, -INFINITY, -INFINITY, -INFINITY, 0};
+    for (uint32_t i = 0; p != NULL && i < count; ++i) {
+        const umb_aabb *b = &boxes[i];
+        p[i] = (struct RTCBuildPrimitive){b->min[0], b->min[1], b->min[2], 0, b->max[0], b->max[1], b->max[2], i};
+        all.lower_x = fminf(all.lower_x, b->min[0]);
+        all.lower_y = fminf(all.lower_y, b->min[1]);
+        all.lower_z = fminf(all.lower_z, b->min[2]);
+        all.upper_x = fmaxf(all.upper_x, b->max[0]);
+        all.upper_y = fmaxf(all.upper_y, b->max[1]);
+        all.upper_z = fmaxf(all.upper_z, b->max[2]);
+    }
+    struct RTCBuildArguments args = rtcDefaultBuildArguments();
+    args.byteSize = sizeof args;
+    args.buildQuality = RTC_BUILD_QUALITY_MEDIUM;
+    args.maxBranchingFactor = UMB_NODE_WIDTH;
+    args.sahBlockSize = 1;
+    args.minLeafSize = 1;
+    args.maxLeafSize = UMB_NODE_WIDTH;
+    args.traversalCost = 1.0f;
+    args.intersectionCost = 1.0f;
+    args.bvh = bvh;
+    args.primitives = p;
+    args.primitiveCount = args.primitiveArrayCapacity = count;
+    args.createNode = make_node;
+    args.setNodeChildren = set_children;
+    args.setNodeBounds = set_bounds;
+    args.createLeaf = make_leaf;
+    const mirror *root = p != NULL ? rtcBuildBVH(&args) : NULL;
+    double cost = root != NULL ? cost_below(root, area_of(&all)) / area_of(&all) : NAN;
+    rtcReleaseBVH(bvh);
+    free(p);
+    return cost;
+}
+
+static bool compare(RTCDevice device, uint32_t count, bool clustered, int rounds)
+{
+    double reach, ours = INFINITY, theirs = INFINITY;
+    umb_scene *scene = make_scene(count, clustered, &reach);
+    umb_aabb *boxes = malloc(count * sizeof *boxes);
+    umb_index_stats stats = {0};
+    bool ok = scene != NULL && boxes != NULL;
+    for (uint32_t i = 0; i < count && ok; ++i) {
+        ok = umb_scene_object_bounds(scene, i, &boxes[i]);
+    }
+    for (int round = 0; round < rounds && ok; ++round) {
+        umb_index *index = NULL;
+        double begin = now_ms();
+        ok = umb_index_create(scene, NULL, &index) == UMB_OK;
+        ours = fmin(ours, now_ms() - begin);
+        theirs = fmin(theirs, time_embree(device, boxes, count));
+        if (ok) {
+            umb_index_get_stats(index, &stats);
+        }
+        umb_index_destroy(index);
+    }
+    if (ok) {
+        double cost = cost_of_embree(device, boxes, count);
+        printf("| %u | %s | %.2f | %.2f | %.2f | %.1f | %.1f | %.3f |\n", count, clustered ? "clustered" : "uniform", ours,
+               theirs, ours / theirs, stats.cost, cost, stats.cost / cost);
+        (void)fflush(stdout);
+    }
+    free(boxes);
+    umb_scene_destroy(scene);
+    return ok;
+}
+
+int main(int argc, char **argv)
+{
+    uint32_t most = argc > 1 ? (uint32_t)strtoul(argv[1], NULL, 10) : 100000;
+    int rounds = argc > 2 ? atoi(argv[2]) : 3;
+    const char *set = argc > 3 ? argv[3] : "";
+    bool ok = most >= 1000 && rounds > 0;
+    for (uint32_t count = 1000; count <= most && ok; count *= 10) {
+        for (int clustered = 0; clustered < 2 && ok; ++clustered) {
+            if (*set == '\0' || strcmp(set, clustered != 0 ? "clustered" : "uniform") == 0) {
+                ok = measure_all(count, clustered != 0, rounds);
+            }
+        }
+    }
+    RTCDevice device = rtcNewDevice("threads=1,set_affinity=0");
+    printf("\nThe default beside Embree's hierarchy of user geometry, medium quality, one thread\n\n| objects | set | ms | "
+           "Embree ms | ratio | cost | Embree's cost | ratio |\n|--:|---|--:|--:|--:|--:|--:|--:|\n");
+    for (uint32_t count = 1000; count <= most && ok; count *= 10) {
+        ok = compare(device, count, false, rounds) && compare(device, count, true, rounds);
+    }
+    rtcReleaseDevice(device);
+    if (!ok) {
+        (void)fprintf(stderr, "bench_index: no memory, or no such number\n");
+    }
+    return ok ? 0 : 1;
+}
