@@ -1,5 +1,5 @@
-/* Nothing that can be seen is hidden: adversarial micro-scenes under three raster sizes, and with
- * every kind of index, against the oracle. UMBRAGE_MICRO_SCENES sets how many (500; small 60; full 10,000). */
+/* Nothing that can be seen is hidden: adversarial micro-scenes under three raster sizes, with every kind of index,
+ * and by every other method, against the oracle. UMBRAGE_MICRO_SCENES sets how many (500; small 60; full 10,000). */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -32,8 +32,11 @@ static uint64_t first_wanted(void)
     return text != NULL ? strtoull(text, NULL, 10) : 0;
 }
 
+/* Methods without a raster; kinds of indices take turns with them. */
+static const umb_method OTHERS[] = {UMB_METHOD_PLANES};
+
 /* Kinds of indices beside the first two, which take turns with all sizes. */
-enum { SIZED = 3, MOST = 64 };
+enum { SIZED = 3, MOST = 64, OTHER_COUNT = sizeof OTHERS / sizeof OTHERS[0], KINDS = 32 };
 
 typedef struct asked {
     umb_index *index;
@@ -41,21 +44,22 @@ typedef struct asked {
     char label[128];
 } asked;
 
-static void ask(umb_scene *scene, const char *kind, const micro_scene *micro, uint64_t number, asked *out,
-                strict_answer *answer)
+static void ask(umb_scene *scene, const char *kind, umb_method method, const micro_scene *micro, uint64_t number,
+                asked *out, strict_answer *answer)
 {
     umb_index_def def = {0};
+    umb_culler_def culler_def = {.method = method};
     umb_visible_set seen;
     assert_true(umb_index_parse(kind, &def));
     assert_int_equal(umb_index_create(scene, &def, &out->index), UMB_OK);
-    assert_int_equal(umb_culler_create(out->index, NULL, &out->culler), UMB_OK);
+    assert_int_equal(umb_culler_create(out->index, &culler_def, &out->culler), UMB_OK);
     assert_int_equal(umb_cull(out->culler, &micro->view, &seen), UMB_OK);
-    (void)snprintf(out->label, sizeof out->label, "micro scene %llu (%s) at %ux%u, %s", (unsigned long long)number,
-                   micro->kind, micro->view.buffer_width, micro->view.buffer_height, kind);
+    (void)snprintf(out->label, sizeof out->label, "micro scene %llu (%s), %s at %ux%u, %s",
+                   (unsigned long long)number, micro->kind, umb_method_name(method), micro->view.buffer_width, micro->view.buffer_height, kind);
     *answer = (strict_answer){seen.objects, seen.count, out->label, NULL};
 }
 
-static void check_scene(uint64_t number, strict_count *sums)
+static void check_scene(uint64_t number, strict_count sums[1 + OTHER_COUNT][KINDS])
 {
     micro_scene micro;
     assert_true(micro_scene_make(number, &micro));
@@ -65,22 +69,27 @@ static void check_scene(uint64_t number, strict_count *sums)
     assert_non_null(scene);
     truth *oracle = truth_create(micro.model, &error);
     assert_non_null(oracle);
-    asked all[SIZED + MOST];
-    strict_answer answers[SIZED + MOST];
+    asked all[SIZED + MOST + OTHER_COUNT];
+    strict_answer answers[SIZED + MOST + OTHER_COUNT];
     uint32_t n = 0;
     for (; n < SIZED; ++n) {
         micro.view.buffer_width = SIZES[n][0];
         micro.view.buffer_height = SIZES[n][1];
-        ask(scene, number % 7 == 0 ? "flat" : "bvh", &micro, number, &all[n], &answers[n]);
+        ask(scene, number % 7 == 0 ? "flat" : "bvh", UMB_METHOD_RASTER, &micro, number, &all[n], &answers[n]);
     }
     micro.view.buffer_width = SIZES[1][0];
     micro.view.buffer_height = SIZES[1][1];
     for (uint32_t k = 2; umb_index_variant(k) != NULL; ++k, ++n) {
         assert_true(n < SIZED + MOST);
-        ask(scene, umb_index_variant(k), &micro, number, &all[n], &answers[n]);
+        ask(scene, umb_index_variant(k), UMB_METHOD_RASTER, &micro, number, &all[n], &answers[n]);
+    }
+    uint32_t rasters = n;
+    for (uint32_t k = 0; k < OTHER_COUNT; ++k, ++n) {
+        const char *kind = umb_index_variant((uint32_t)number % (rasters - SIZED + 2));
+        ask(scene, kind, OTHERS[k], &micro, number, &all[n], &answers[n]);
     }
     for (uint32_t k = 0; k < n; ++k) {
-        answers[k].sum = &sums[number % micro_scene_kinds()];
+        answers[k].sum = &sums[k < rasters ? 0 : 1 + k - rasters][number % micro_scene_kinds()];
     }
     truth_options options = {
         .grid_width = 96, .grid_height = 96, .guided_rays = 120000, .threads = 1};
@@ -97,23 +106,27 @@ static void check_scene(uint64_t number, strict_count *sums)
 static void test_micro_scenes(void **state)
 {
     (void)state;
-    strict_count sums[32] = {{0}};
-    uint64_t first = first_wanted(), n = wanted(), wrong = 0, culled = 0;
+    strict_count sums[1 + OTHER_COUNT][KINDS] = {{{0}}};
+    uint64_t first = first_wanted(), n = wanted(), wrong = 0;
     for (uint64_t i = first; i < first + n; ++i) {
         check_scene(i, sums);
     }
-    for (uint32_t k = 0; k < micro_scene_kinds(); ++k) {
-        const strict_count *c = &sums[k];
-        printf("# kind %u: views %llu objects %llu reported %llu seen %llu wrongly hidden %llu "
-               "unconfirmed %llu\n",
-               k, (unsigned long long)c->views, (unsigned long long)c->objects,
-               (unsigned long long)c->reported, (unsigned long long)c->truth_visible,
-               (unsigned long long)c->wrongly_hidden, (unsigned long long)c->unconfirmed);
-        wrong += c->wrongly_hidden;
-        culled += c->objects - c->reported;
+    for (uint32_t m = 0; m <= OTHER_COUNT; ++m) {
+        uint64_t culled = 0;
+        for (uint32_t k = 0; k < micro_scene_kinds(); ++k) {
+            const strict_count *c = &sums[m][k];
+            printf("# %s, kind %u: views %llu objects %llu reported %llu seen %llu wrongly hidden %llu "
+                   "unconfirmed %llu\n",
+                   umb_method_name(m == 0 ? UMB_METHOD_RASTER : OTHERS[m - 1]), k, (unsigned long long)c->views,
+                   (unsigned long long)c->objects, (unsigned long long)c->reported,
+                   (unsigned long long)c->truth_visible, (unsigned long long)c->wrongly_hidden,
+                   (unsigned long long)c->unconfirmed);
+            wrong += c->wrongly_hidden;
+            culled += c->objects - c->reported;
+        }
+        assert_true(culled > n); /* the test would pass if nothing were ever hidden */
     }
     assert_int_equal(wrong, 0);
-    assert_true(culled > n); /* the test would pass if nothing were ever hidden */
 }
 
 int main(void)

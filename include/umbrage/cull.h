@@ -14,7 +14,9 @@ typedef struct umb_culler umb_culler;
 /* Ways to decide occlusion. */
 typedef enum umb_method {
     UMB_METHOD_RASTER = 0, /* strict silhouette raster (docs/conservative.md); the default */
-    UMB_METHOD_NONE = 1    /* frustum culling only */
+    UMB_METHOD_NONE = 1,   /* frustum culling only */
+    UMB_METHOD_PLANES = 2  /* strict, in object space, no raster: large occluders, chosen first, and their planes
+                              (Coorg and Teller 1997; Gummerus 5.4) */
 } umb_method;
 
 /* What a method promises. */
@@ -43,7 +45,9 @@ typedef enum umb_coherence {
        (conservative hierarchical updating). May report more, for three frames. */
     UMB_COHERENCE_CONSERVATIVE = 1u << 3,
     /* An occluder that covered nothing new when it was last drawn rests for 1, 2, 4, then 8 frames, as long as its
-       image stays much where and what it was; convex ones, which are cheap, do not. May report more. */
+       image stays much where and what it was; convex ones, which are cheap, do not. May report more.
+       UMB_METHOD_PLANES: one that was chosen and hid nothing, convex or not, makes room for others as long; it
+       knows no other switch. */
     UMB_COHERENCE_REST = 1u << 4,
     UMB_COHERENCE_ALL = (1u << 5) - 1
 } umb_coherence;
@@ -66,7 +70,8 @@ typedef struct umb_culler_def {
     uint32_t coherence;
     /* Draw at most so many occluders in a frame, those with the best score: the area of the image of their box,
        times how often their drawing changed anything of late. What score it takes is learned from frame to frame;
-       the first frame draws the nearest. 0: no limit. */
+       the first frame draws the nearest. 0: no limit. UMB_METHOD_PLANES chooses so many for each frame by how
+       large they look, 0: 64; at most 65534. */
     uint32_t occluder_budget;
     /* Do not put the answer in order: objects come as they are found, the same ones as in order, in an order that
        depends on the scene, the index and the view alone. What lies below a node wholly inside the frustum is then
@@ -97,6 +102,7 @@ typedef struct umb_cull_stats {
     uint32_t strays;       /* of the former, objects outside of the volume that was to hold them: a broken promise, or
                               a fuzzy one */
     uint32_t hidden_movers; /* moving objects that nobody had to ask for */
+    uint32_t tests;        /* occluders held against a node's boxes, by methods that choose them first */
 } umb_cull_stats;
 
 /* The answer. Borrowed: valid until the culler's next call. */
@@ -132,7 +138,7 @@ UMB_API umb_result umb_cull(umb_culler *culler, const umb_view *view, umb_visibl
 UMB_API bool umb_culler_read_buffer(const umb_culler *culler, float *pixels, size_t capacity,
                                     uint32_t *width, uint32_t *height);
 
-/* "raster", "none"; "strict", "pixel", "approximate". */
+/* "raster", "none", "planes"; "strict", "pixel", "approximate". */
 UMB_API const char *umb_method_name(umb_method method);
 UMB_API const char *umb_class_name(umb_class class_);
 

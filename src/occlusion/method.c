@@ -1,8 +1,18 @@
 #include "method.h"
 
+#include "planes.h"
+
 const umb_method_ops *umb_method_get(umb_method method)
 {
-    return method == UMB_METHOD_RASTER ? &umb_raster_method : NULL;
+    switch (method) {
+    case UMB_METHOD_RASTER:
+        return &umb_raster_method;
+    case UMB_METHOD_PLANES:
+        return &umb_planes_method;
+    case UMB_METHOD_NONE:
+        break;
+    }
+    return NULL;
 }
 
 const char *umb_method_name(umb_method method)
@@ -12,6 +22,8 @@ const char *umb_method_name(umb_method method)
         return "raster";
     case UMB_METHOD_NONE:
         return "none";
+    case UMB_METHOD_PLANES:
+        return "planes";
     }
     return "unknown";
 }

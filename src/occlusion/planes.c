@@ -1,0 +1,329 @@
+/* Coorg and Teller: large occluders, exact planes (1997; Gummerus 5.4).
+ *
+ * The occluders of a frame are chosen first, those that look largest. Going down the index, a node's boxes are held
+ * against the occluders that the node's own box left: one that a box lies wholly beside is not asked about below it,
+ * and a box that is left with none is clear. A box is hidden by one occluder, or by several that share edges.
+ *
+ * Which side of which plane a box is on is decided in floats where these can tell, else in doubles; where doubles
+ * cannot, the box counts as crossing it. docs/conservative.md, 14. */
+#include "planes.h"
+
+#include <string.h>
+
+#include "select.h"
+
+#define CHOSEN 64
+/* Lists of the nodes that wait: as deep as trees are, eight boxes each. */
+#define LEVELS 48
+/* Occluders that hide a box together. */
+#define MOST_TOGETHER 32
+
+/* A blocker as a node's boxes see it, a bit for each. */
+typedef struct seen {
+    uint16_t blocker;
+    uint8_t alive;  /* hides a part of the box, as far as one can see */
+    uint8_t behind; /* all of the box is beyond its surface, on sight-lines that meet it beyond near */
+    uint8_t full;   /* and on the inner side of each edge */
+    uint8_t in[UMB_BLOCKER_EDGES];
+} seen;
+
+typedef struct planes {
+    umb_allocator allocator;
+    const umb_planes_kernels *kernels;
+    const umb_box_kernels *box_kernels;
+    umb_selector selector;
+    umb_blockers blockers;
+    const umb_choice *choice;
+    uint16_t *arena; /* lists of blockers: their number, then each */
+    uint32_t *hidden; /* per blocker: boxes that it hid, alone or with others */
+    uint16_t *seen_of; /* per blocker: its place in seen, if that one is it */
+    seen *seen;
+    uint32_t seen_count;
+    size_t arena_capacity, hidden_capacity, seen_of_capacity, seen_capacity;
+    uint32_t arena_top;
+} planes;
+
+static umb_result create(const umb_allocator *allocator, umb_isa isa, void **state)
+{
+    planes *p = umb_memory_allocate_zero(allocator, 1, sizeof *p);
+    if (p == NULL) {
+        return UMB_ERROR_MEMORY;
+    }
+    p->allocator = *allocator;
+    p->kernels = umb_planes_kernels_get(isa);
+    p->box_kernels = umb_box_kernels_get(isa);
+    umb_selector_create(&p->selector, allocator);
+    *state = p;
+    return UMB_OK;
+}
+
+static void destroy(void *state)
+{
+    planes *p = state;
+    umb_allocator a = p->allocator;
+    umb_selector_free(&p->selector);
+    umb_blockers_free(&p->blockers, &a);
+    umb_memory_free(&a, p->arena, p->arena_capacity * sizeof *p->arena);
+    umb_memory_free(&a, p->hidden, p->hidden_capacity * sizeof *p->hidden);
+    umb_memory_free(&a, p->seen_of, p->seen_of_capacity * sizeof *p->seen_of);
+    umb_memory_free(&a, p->seen, p->seen_capacity * sizeof *p->seen);
+    umb_memory_free(&a, p, sizeof *p);
+}
+
+static bool reserve(planes *p, uint32_t wanted)
+{
+    const umb_allocator *a = &p->allocator;
+    size_t lists = (size_t)(wanted + 1) * UMB_NODE_WIDTH * LEVELS;
+    return umb_memory_reserve(a, (void **)&p->arena, &p->arena_capacity, lists, sizeof *p->arena) &&
+           umb_memory_reserve(a, (void **)&p->hidden, &p->hidden_capacity, wanted, sizeof *p->hidden) &&
+           umb_memory_reserve(a, (void **)&p->seen_of, &p->seen_of_capacity, wanted, sizeof *p->seen_of) &&
+           umb_memory_reserve(a, (void **)&p->seen, &p->seen_capacity, wanted, sizeof *p->seen);
+}
+
+/* Feedback of the last frame. */
+static void tell_selector(planes *p)
+{
+    for (uint32_t i = 0; i < p->blockers.count; ++i) {
+        umb_select_feedback(&p->selector, p->blockers.list[i].occluder, p->hidden[i]);
+    }
+}
+
+static umb_result choose(void *state, const umb_choice *choice)
+{
+    planes *p = state;
+    uint32_t wanted = choice->budget != 0 ? choice->budget : CHOSEN;
+    wanted = wanted < UINT16_MAX ? wanted : UINT16_MAX - 1;
+    if ((choice->coherence & UMB_COHERENCE_REST) != 0 && p->selector.known &&
+        p->selector.structure == choice->scene->structure) {
+        tell_selector(p);
+    }
+    p->choice = choice;
+    p->blockers.count = 0;
+    if (!reserve(p, wanted) || !umb_blockers_begin(&p->blockers, &p->allocator, &choice->viewer, wanted)) {
+        return UMB_ERROR_MEMORY;
+    }
+    umb_result result = umb_select_begin(&p->selector, choice, p->box_kernels);
+    umb_pick pick;
+    while (result == UMB_OK && p->blockers.count < wanted && umb_select_next(&p->selector, &pick)) {
+        umb_blockers_add(&p->blockers, &(umb_blocker_def){.place = pick.place,
+                                                          .facets = pick.facets,
+                                                          .occluder = pick.occluder,
+                                                          .set = pick.set,
+                                                          .facet = pick.facet});
+    }
+    if (result != UMB_OK || p->selector.failed) {
+        return UMB_ERROR_MEMORY;
+    }
+    umb_blockers_join(&p->blockers);
+    p->arena[0] = (uint16_t)p->blockers.count;
+    for (uint32_t i = 0; i < p->blockers.count; ++i) {
+        p->arena[1 + i] = (uint16_t)i;
+        p->hidden[i] = 0;
+        p->seen_of[i] = 0;
+    }
+    choice->stats->occluders = p->blockers.count;
+    return UMB_OK;
+}
+
+static umb_aabb box_of(const umb_node *node, uint32_t slot)
+{
+    umb_aabb box;
+    for (int i = 0; i < 3; ++i) {
+        box.min[i] = node->min[i][slot];
+        box.max[i] = node->max[i][slot];
+    }
+    return box;
+}
+
+/* What floats left open, by doubles. */
+static void decide_edge(const planes *p, const umb_node *boxes, const umb_blocker_edge *edge, uint32_t mask,
+                        umb_sides *s)
+{
+    uint32_t unsure = mask & (~(uint32_t)(s->in | s->open) | ~(uint32_t)(s->out | s->part));
+    for (; unsure != 0; unsure &= unsure - 1) {
+        uint32_t slot = (uint32_t)__builtin_ctz(unsure);
+        uint8_t bit = (uint8_t)(1u << slot);
+        umb_aabb box = box_of(boxes, slot);
+        int side = umb_blockers_edge_side(&p->blockers, edge, &box);
+        s->in = (uint8_t)(side > 0 ? s->in | bit : s->in & ~bit);
+        s->out = (uint8_t)(side < 0 ? s->out | bit : s->out & ~bit);
+    }
+}
+
+/* The edges of a blocker: fills in in[] and returns the boxes that are out of one. A cell's edges have a half-space
+ * for each of its points: in when in all, out when out of all. */
+static uint32_t see_edges(const planes *p, const umb_node *boxes, const umb_blocker *k, umb_sides *sides, uint32_t mask,
+                          seen *out)
+{
+    uint32_t points = p->blockers.viewer.point_count, gone = 0;
+    for (uint32_t e = 0; e < k->edge_count; ++e) {
+        umb_sides s = sides[e * points];
+        for (uint32_t i = 1; i < points; ++i) {
+            const umb_sides *t = &sides[e * points + i];
+            s.in &= t->in;
+            s.out &= t->out;
+            s.open |= t->open;
+            s.part |= t->part;
+        }
+        decide_edge(p, boxes, &p->blockers.edges[k->first_edge + e], mask & ~gone, &s);
+        out->in[e] = s.in;
+        gone |= s.out;
+    }
+    return gone & mask;
+}
+
+static uint32_t see_planes(const planes *p, const umb_node *boxes, const umb_blocker *k, const umb_sides *sides,
+                           uint32_t mask, uint32_t *front)
+{
+    uint32_t behind = mask;
+    for (uint32_t i = 0; i < k->plane_count; ++i) {
+        umb_sides s = sides[i];
+        for (uint32_t unsure = behind & ~(uint32_t)(s.in | s.open); unsure != 0; unsure &= unsure - 1) {
+            uint32_t slot = (uint32_t)__builtin_ctz(unsure);
+            umb_aabb box = box_of(boxes, slot);
+            bool is = umb_blockers_behind(&p->blockers, &p->blockers.planes[k->first_plane + i], &box);
+            s.in |= (uint8_t)((is ? 1u : 0u) << slot);
+        }
+        behind &= s.in;
+        *front |= s.out;
+    }
+    for (uint32_t i = 0; i < k->near_count; ++i) {
+        behind &= sides[k->plane_count + i].in;
+    }
+    return behind;
+}
+
+/* False if the blocker hides nothing of any box. */
+static bool look(const planes *p, const umb_query *q, const umb_near_boxes *boxes, uint32_t blocker, seen *out)
+{
+    const umb_blocker *k = &p->blockers.list[blocker];
+    uint32_t edge_spaces = k->edge_count * p->blockers.viewer.point_count;
+    uint32_t count = edge_spaces + k->plane_count + k->near_count;
+    uint32_t may_stop = p->blockers.viewer.point_count == 1 ? edge_spaces : 0;
+    umb_sides sides[UMB_BLOCKER_EDGES * 8 + 2 * UMB_BLOCKER_PLANES];
+    if (p->kernels->sides(boxes, &p->blockers.spaces[k->first_space], count, may_stop, q->mask, sides) < count) {
+        return false;
+    }
+    uint32_t front = 0;
+    uint32_t gone = see_edges(p, q->boxes, k, sides, q->mask, out);
+    uint32_t behind = see_planes(p, q->boxes, k, sides + edge_spaces, q->mask & ~gone, &front);
+    uint32_t full = behind;
+    for (uint32_t e = 0; e < k->edge_count; ++e) {
+        full &= out->in[e];
+    }
+    out->blocker = (uint16_t)blocker;
+    out->alive = (uint8_t)(q->mask & ~gone & ~front);
+    out->behind = (uint8_t)(behind & out->alive);
+    out->full = (uint8_t)(full & out->alive);
+    return out->alive != 0;
+}
+
+/* The blockers that are joined over the edges which a box crosses, from one of them on: hidden when no edge is left
+ * that it crosses. */
+static bool hidden_together(planes *p, uint32_t start, uint32_t slot)
+{
+    uint16_t todo[MOST_TOGETHER];
+    uint32_t count = 0, bit = 1u << slot;
+    todo[count++] = (uint16_t)start;
+    for (uint32_t i = 0; i < count; ++i) {
+        const seen *s = &p->seen[todo[i]];
+        const umb_blocker *k = &p->blockers.list[s->blocker];
+        if ((s->behind & bit) == 0) {
+            return false;
+        }
+        for (uint32_t e = 0; e < k->edge_count; ++e) {
+            uint32_t beyond = p->blockers.edges[k->first_edge + e].beyond, at, j = 0;
+            if ((s->in[e] & bit) != 0) {
+                continue;
+            }
+            at = beyond != UMB_NONE ? p->seen_of[beyond] : UMB_NONE;
+            if (at >= p->seen_count || p->seen[at].blocker != beyond) {
+                return false;
+            }
+            while (j < count && todo[j] != at) {
+                ++j;
+            }
+            if (j == count && count == MOST_TOGETHER) {
+                return false;
+            }
+            todo[j] = (uint16_t)at;
+            count += j == count;
+        }
+    }
+    for (uint32_t i = 0; i < count; ++i) {
+        p->hidden[p->seen[todo[i]].blocker] += 1;
+    }
+    return true;
+}
+
+static uint32_t find_together(planes *p, uint32_t mask)
+{
+    uint32_t hidden = 0;
+    for (uint32_t i = 0; i < p->seen_count; ++i) {
+        const seen *s = &p->seen[i];
+        if (!p->blockers.list[s->blocker].joined) {
+            continue;
+        }
+        for (uint32_t left = s->behind & mask & ~hidden; left != 0; left &= left - 1) {
+            uint32_t slot = (uint32_t)__builtin_ctz(left);
+            hidden |= hidden_together(p, i, slot) ? 1u << slot : 0;
+        }
+    }
+    return hidden;
+}
+
+/* The list for a box: the blockers that hide a part of it. */
+static uint32_t hand_down(planes *p, uint32_t slot, uint32_t parent)
+{
+    uint32_t count = 0, at = p->arena_top;
+    if (at + 1 + p->seen_count > p->arena_capacity) {
+        return parent;
+    }
+    for (uint32_t i = 0; i < p->seen_count; ++i) {
+        if ((p->seen[i].alive >> slot & 1u) != 0) {
+            p->arena[at + 1 + count++] = p->seen[i].blocker;
+        }
+    }
+    if (count == 0) {
+        return UMB_TOKEN_CLEAR;
+    }
+    p->arena[at] = (uint16_t)count;
+    p->arena_top = at + 1 + count;
+    return at;
+}
+
+static void ask(void *state, umb_query *q)
+{
+    planes *p = state;
+    const uint16_t *list = p->arena + q->token;
+    uint32_t hidden = 0;
+    umb_near_boxes boxes;
+    p->kernels->place(q->boxes, p->blockers.origin_high, p->blockers.origin_low, &boxes);
+    p->seen_count = 0;
+    p->choice->stats->tests += list[0];
+    for (uint32_t i = 0; i < list[0] && (q->mask & ~hidden) != 0; ++i) {
+        seen *s = &p->seen[p->seen_count];
+        if (!look(p, q, &boxes, list[1 + i], s)) {
+            continue;
+        }
+        p->seen_of[s->blocker] = (uint16_t)p->seen_count++;
+        p->hidden[s->blocker] += (uint32_t)__builtin_popcount(s->full & ~hidden);
+        hidden |= s->full;
+    }
+    hidden |= find_together(p, q->mask & ~hidden);
+    q->hidden = hidden;
+    p->arena_top = q->token + 1 + list[0];
+    for (uint32_t left = q->mask & ~hidden; left != 0; left &= left - 1) {
+        uint32_t slot = (uint32_t)__builtin_ctz(left);
+        q->tokens[slot] = hand_down(p, slot, q->token);
+    }
+}
+
+const umb_method_ops umb_planes_method = {
+    .name = "planes",
+    .class_ = UMB_CLASS_STRICT,
+    .create = create,
+    .destroy = destroy,
+    .choose = choose,
+    .ask = ask,
+};

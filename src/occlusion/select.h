@@ -1,0 +1,85 @@
+/* Choosing occluders before the walk (Gummerus 5.2): the facets and bodies that look largest, the largest first.
+ *
+ * Candidates are found over the index, best first: a node is opened only while something below it could look larger
+ * than what has been found, by the largest area below it and its distance. So choosing costs what lies near, not
+ * what exists. Candidates outside of the frustum are left out. */
+#ifndef UMB_SELECT_H
+#define UMB_SELECT_H
+
+#include "facets.h"
+#include "frustum/box_kernels.h"
+#include "method.h"
+
+/* By what candidates are ranked (measure.h). */
+typedef enum umb_select_by {
+    UMB_SELECT_SOLID_ANGLE,
+    UMB_SELECT_AREA_ANGLE,
+    UMB_SELECT_UMBRA_GROWTH
+} umb_select_by;
+
+/* An occluder that was chosen: a facet, or all of a convex body when facet is UMB_NONE. */
+typedef struct umb_pick {
+    const umb_occluder *place;
+    const umb_facets *facets;
+    uint32_t occluder; /* its number in the scene */
+    uint32_t set;      /* facets of equal sets know each other's numbers */
+    uint32_t facet;
+    float score;
+} umb_pick;
+
+typedef struct umb_candidate {
+    float score;
+    uint32_t ref;   /* as in index/tree.h; of an occluder's item: UMB_REF_OCCLUDER and its number */
+    uint32_t facet; /* of an occluder; UMB_NONE: the item as a whole */
+    uint16_t planes;
+    uint8_t ready; /* the score is its own, no bound */
+} umb_candidate;
+
+typedef struct umb_rest {
+    uint32_t until; /* the frame from which on it is chosen again */
+    uint8_t idle;   /* how often on end it hid nothing */
+} umb_rest;
+
+/* What is known of a scene's occluders, and the search that goes on. */
+typedef struct umb_selector {
+    umb_allocator allocator;
+    umb_facets *sets;      /* one for each mesh that is an occluder; the last one is of all welded surfaces */
+    uint32_t set_count;
+    uint32_t *set_of;      /* per occluder */
+    umb_facet_source soup; /* of the welded surfaces; owned */
+    uint32_t *soup_tags;
+    uint8_t *soup_sides;
+    uint32_t soup_positions;
+    uint32_t *soup_first;  /* per occluder: its first facet in the last set; the end is the next one's */
+    float *areas;          /* per occluder: bounds of the area that it can show */
+    float *node_areas;     /* per node and block: the largest below it */
+    size_t set_capacity, of_capacity, first_capacity, area_capacity, node_capacity;
+    size_t soup_position_capacity, soup_triangle_capacity, soup_tag_capacity, soup_side_capacity;
+    uint64_t structure, version;
+    bool known;            /* structure is what the above was made for */
+    umb_rest *rests;       /* per occluder; feedback */
+    size_t rest_capacity;
+    uint32_t frame;
+    umb_select_by by;
+    /* the search */
+    umb_candidate *heap;
+    size_t heap_count, heap_capacity;
+    const umb_choice *choice;
+    const umb_box_kernels *kernels;
+    double eye[3];
+    bool failed; /* no memory for candidates: some were left out */
+} umb_selector;
+
+void umb_selector_create(umb_selector *s, const umb_allocator *a);
+void umb_selector_free(umb_selector *s);
+
+/* Begin to choose for a frame: brings what is known up to date with the scene and the index. */
+umb_result umb_select_begin(umb_selector *s, const umb_choice *choice, const umb_box_kernels *kernels);
+/* The next best; false when there is none. */
+bool umb_select_next(umb_selector *s, umb_pick *out);
+
+/* After the frame: an occluder was used and hid so many boxes. Where choice->coherence has UMB_COHERENCE_REST, one
+ * that hid nothing is not chosen for 1, 2, 4, then 8 frames. */
+void umb_select_feedback(umb_selector *s, uint32_t occluder, uint32_t hidden);
+
+#endif
