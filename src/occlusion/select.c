@@ -465,6 +465,10 @@ static void expand(umb_selector *s, uint32_t occluder)
 {
     umb_pick p = pick_of(s, occluder, UMB_NONE, 0.0f);
     uint32_t ref = UMB_REF_OCCLUDER | occluder;
+    if (s->rests[occluder].met == s->frame) {
+        return;
+    }
+    s->rests[occluder].met = s->frame;
     if ((s->choice->coherence & UMB_COHERENCE_REST) != 0 && s->rests[occluder].until > s->frame) {
         s->choice->stats->resting += 1;
         return;

@@ -37,6 +37,7 @@ typedef struct umb_candidate {
 
 typedef struct umb_rest {
     uint32_t until; /* the frame from which on it is chosen again */
+    uint32_t met;   /* the frame in which the search last came upon it: trees may hold it in parts */
     uint8_t idle;   /* how often on end it hid nothing */
 } umb_rest;
 
@@ -57,7 +58,7 @@ typedef struct umb_selector {
     size_t soup_position_capacity, soup_triangle_capacity, soup_tag_capacity, soup_side_capacity;
     uint64_t structure, version;
     bool known;            /* structure is what the above was made for */
-    umb_rest *rests;       /* per occluder; feedback */
+    umb_rest *rests;       /* per occluder */
     size_t rest_capacity;
     uint32_t frame;
     umb_select_by by;
