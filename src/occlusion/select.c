@@ -52,7 +52,7 @@ void umb_selector_free(umb_selector *s)
 
 static bool is_welded(const umb_occluder *o)
 {
-    return o->owner == UMB_NONE && o->identity;
+    return o->owner == UMB_NONE && o->identity && !o->moves;
 }
 
 /* The surfaces that stand in world coordinates, as one: equal positions are one vertex, equal triangles one. */
@@ -226,10 +226,14 @@ static bool is_body(const umb_selector *s, const umb_committed *scene, uint32_t 
     return o->mesh->convex && !is_welded(o) && s->sets[s->set_of[occluder]].facet_count <= 16;
 }
 
+/* What moves by itself is not where the scene says. */
 static float area_of(const umb_selector *s, const umb_committed *scene, uint32_t occluder)
 {
     const umb_facets *f = &s->sets[s->set_of[occluder]];
     const umb_occluder *o = &scene->occluders[occluder];
+    if (o->moves) {
+        return 0.0f;
+    }
     if (is_body(s, scene, occluder)) {
         float sum = 0.0f;
         for (uint32_t i = 0; i < f->facet_count; ++i) {
