@@ -2,7 +2,7 @@
 #ifndef UMB_PLANES_H
 #define UMB_PLANES_H
 
-#include "blockers.h"
+#include "blocker_set.h"
 #include "planes_kernels.h"
 
 extern const umb_method_ops umb_planes_method;

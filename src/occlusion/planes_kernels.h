@@ -2,7 +2,7 @@
 #ifndef UMB_PLANES_KERNELS_H
 #define UMB_PLANES_KERNELS_H
 
-#include "blockers.h"
+#include "blocker_set.h"
 
 /* A node's boxes relative to the origin of blockers: the lower face along each axis, then the upper ones. */
 typedef struct umb_near_boxes {

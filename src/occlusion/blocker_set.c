@@ -1,4 +1,4 @@
-#include "blockers.h"
+#include "blocker_set.h"
 
 #include <string.h>
 
