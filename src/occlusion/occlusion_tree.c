@@ -1,0 +1,447 @@
+#include "occlusion_tree.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/memory.h"
+#include "geometry/orient.h"
+
+/* Corners of all fragments on the way down from a polygon, while it is inserted or asked about. */
+enum { ROOM = 640, MOST_CORNERS = UMB_SHADOW_LINES + 8, MOST_MEMBERS = 12, MOST_DEPTH = 1000, MOST_COVERS = 4 };
+
+typedef struct polygon {
+    umb_seen_corner *corners;
+    uint32_t count;
+} polygon;
+
+/* ---- room ---------------------------------------------------------------------------------------- */
+
+bool umb_occlusion_tree_reserve(umb_occlusion_tree *t, const umb_allocator *a, uint32_t nodes, uint32_t covers)
+{
+    return umb_memory_reserve(a, (void **)&t->nodes, &t->node_capacity, nodes, sizeof *t->nodes) &&
+           umb_memory_reserve(a, (void **)&t->covers, &t->cover_capacity, covers, sizeof *t->covers) &&
+           umb_memory_reserve(a, (void **)&t->members, &t->member_capacity, 2 * (size_t)covers, sizeof *t->members);
+}
+
+void umb_occlusion_tree_free(umb_occlusion_tree *t, const umb_allocator *a)
+{
+    umb_memory_free(a, t->nodes, t->node_capacity * sizeof *t->nodes);
+    umb_memory_free(a, t->covers, t->cover_capacity * sizeof *t->covers);
+    umb_memory_free(a, t->members, t->member_capacity * sizeof *t->members);
+    memset(t, 0, sizeof *t);
+}
+
+static bool is_leaf(uint32_t ref)
+{
+    return (ref & UMB_OCCLUSION_COVERED) != 0;
+}
+
+static bool is_open(uint32_t ref)
+{
+    return ref == UMB_OCCLUSION_OPEN_CELL;
+}
+
+static const umb_occlusion_cover *cover_of(const umb_occlusion_tree *t, uint32_t ref)
+{
+    return &t->covers[ref & ~UMB_OCCLUSION_COVERED];
+}
+
+/* UMB_OCCLUSION_OPEN_CELL if there is no room. other: a cell's cover that stays, or UMB_OCCLUSION_OPEN_CELL. */
+static uint32_t add_cover(umb_occlusion_tree *t, const uint32_t *members, uint32_t count, uint32_t other)
+{
+    uint32_t length = is_open(other) ? 0 : 1 + cover_of(t, other)->length;
+    if (t->cover_count >= t->cover_capacity || t->member_count + (size_t)count > t->member_capacity) {
+        t->given_up += 1;
+        return UMB_OCCLUSION_OPEN_CELL;
+    }
+    t->covers[t->cover_count] = (umb_occlusion_cover){t->member_count, count, other, length};
+    for (uint32_t i = 0; i < count; ++i) {
+        t->members[t->member_count++] = members[i];
+    }
+    return UMB_OCCLUSION_COVERED | t->cover_count++;
+}
+
+/* ---- fragments ------------------------------------------------------------------------------------ */
+
+typedef struct sides {
+    bool negative, positive, unknown;
+} sides;
+
+static sides find_sides(const umb_occlusion_tree *t, const polygon *p, const umb_seen_line *line, int8_t *out)
+{
+    sides s = {false, false, false};
+    for (uint32_t i = 0; i < p->count; ++i) {
+        int side = umb_seen_side(&t->shadows->viewer.sight, line, &p->corners[i]);
+        s.negative = s.negative || side == -1;
+        s.positive = s.positive || side == 1;
+        s.unknown = s.unknown || side == UMB_SEEN_UNKNOWN;
+        out[i] = (int8_t)side;
+    }
+    return s;
+}
+
+/* Edges along a line of the tree need no line of their own. */
+static void close_edges(polygon *p, const int8_t *side)
+{
+    for (uint32_t i = 0; i < p->count; ++i) {
+        if (side[i] == 0 && side[i + 1 < p->count ? i + 1 : 0] == 0) {
+            p->corners[i].closed = true;
+        }
+    }
+}
+
+/* The part on one side, written behind the polygon; false if the room ends before top does. */
+static bool cut(const polygon *p, const umb_seen_line *line, const int8_t *side, int keep, const umb_seen_corner *top,
+                polygon *out)
+{
+    out->corners = p->corners + p->count;
+    if (out->corners + p->count + 2 > top || p->count + 2 > MOST_CORNERS) {
+        return false;
+    }
+    umb_seen_cut c = {line, p->corners, side, p->count};
+    out->count = umb_seen_clip(&c, keep, out->corners);
+    return true;
+}
+
+/* ---- building ------------------------------------------------------------------------------------- */
+
+/* True if no point of shadow a's front is before the plane of any triangle of b's: where both are in the picture, what is
+ * beyond a is beyond b. */
+static bool lies_behind(const umb_shadows *s, uint32_t a, uint32_t b)
+{
+    const umb_shadow *x = &s->items[a], *y = &s->items[b];
+    for (uint32_t i = 0; i < y->plane_count; ++i) {
+        const umb_shadow_plane *p = &s->planes[y->first_plane + i];
+        for (uint32_t k = 0; k < x->plane_count; ++k) {
+            const umb_shadow_plane *q = &s->planes[x->first_plane + k];
+            if (umb_orient(p->a, p->b, p->c, q->a) > 0 || umb_orient(p->a, p->b, p->c, q->b) > 0 ||
+                umb_orient(p->a, p->b, p->c, q->c) > 0) {
+                return false;
+            }
+        }
+        for (uint32_t k = 0; k < x->line_count; ++k) { /* corners whose triangles share a plane */
+            const umb_seen_line *l = &s->lines[x->first_line + k];
+            if (!l->free && umb_orient(p->a, p->b, p->c, l->a) > 0) {
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+static bool all_behind(const umb_occlusion_tree *t, const umb_occlusion_cover *c, uint32_t shadow, bool cover_behind)
+{
+    for (uint32_t i = 0; i < c->count; ++i) {
+        uint32_t other = t->members[c->first + i];
+        if (!(cover_behind ? lies_behind(t->shadows, other, shadow) : lies_behind(t->shadows, shadow, other))) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* One cover for the cells of both, or UMB_OCCLUSION_OPEN_CELL if that would say less. */
+static uint32_t join_covers(umb_occlusion_tree *t, uint32_t a, uint32_t b)
+{
+    const umb_occlusion_cover *x = cover_of(t, a), *y = cover_of(t, b);
+    uint32_t members[MOST_MEMBERS], count = 0;
+    if (x->count == 0 || y->count == 0 || x->length != 0 || y->length != 0 || x->count + y->count > MOST_MEMBERS) {
+        return UMB_OCCLUSION_OPEN_CELL; /* what is beyond the frame stays as it is */
+    }
+    for (uint32_t i = 0; i < x->count; ++i) {
+        members[count++] = t->members[x->first + i];
+    }
+    for (uint32_t i = 0; i < y->count; ++i) {
+        uint32_t member = t->members[y->first + i];
+        bool known = false;
+        for (uint32_t k = 0; k < x->count; ++k) {
+            known = known || members[k] == member;
+            if (members[k] != member && !(lies_behind(t->shadows, member, members[k]) &&
+                                          lies_behind(t->shadows, members[k], member))) {
+                return UMB_OCCLUSION_OPEN_CELL;
+            }
+        }
+        if (!known) {
+            members[count++] = member;
+        }
+    }
+    return count == x->count ? a : count == y->count ? b : add_cover(t, members, count, UMB_OCCLUSION_OPEN_CELL);
+}
+
+/* What stands for a node after its children have changed. */
+static uint32_t close_node(umb_occlusion_tree *t, uint32_t number)
+{
+    const umb_occlusion_node *n = &t->nodes[number];
+    uint32_t a = n->child[0], b = n->child[1];
+    if (!t->modified || !is_leaf(a) || !is_leaf(b) || is_open(a) || is_open(b)) {
+        return number;
+    }
+    uint32_t joined = join_covers(t, a, b);
+    return is_open(joined) ? number : joined;
+}
+
+/* The tree of one fragment in a cell: a line for each edge that no line above it stands for. */
+static uint32_t plant(umb_occlusion_tree *t, const polygon *p, uint32_t shadow, uint32_t outside, uint32_t other)
+{
+    uint32_t open = 0, below;
+    for (uint32_t i = 0; i < p->count; ++i) {
+        open += !p->corners[i].closed;
+    }
+    if (t->node_count + (size_t)open > t->node_capacity) {
+        t->given_up += 1;
+        return outside;
+    }
+    below = add_cover(t, &shadow, 1, other);
+    if (is_open(below)) {
+        return outside;
+    }
+    for (uint32_t i = 0; i < p->count; ++i) {
+        const umb_seen_corner *c = &p->corners[i];
+        if (c->closed) {
+            continue;
+        }
+        umb_occlusion_node *n = &t->nodes[t->node_count];
+        n->line = c->edge;
+        n->child[c->flip ? 0 : 1] = below;
+        n->child[c->flip ? 1 : 0] = outside;
+        below = t->node_count++;
+    }
+    return below;
+}
+
+/* A front on its way down. */
+typedef struct seed {
+    umb_occlusion_tree *tree;
+    uint32_t shadow;
+    const umb_seen_corner *top;
+} seed;
+
+static uint32_t insert_in_cell(const seed *s, uint32_t ref, const polygon *p)
+{
+    umb_occlusion_tree *t = s->tree;
+    if (is_open(ref)) {
+        return plant(t, p, s->shadow, ref, ref);
+    }
+    bool nearer = true;
+    for (uint32_t k = ref; !is_open(k); k = cover_of(t, k)->other) {
+        const umb_occlusion_cover *c = cover_of(t, k);
+        if (c->count == 0 || all_behind(t, c, s->shadow, false)) {
+            return ref; /* out of view, or behind what is there */
+        }
+        nearer = nearer && all_behind(t, c, s->shadow, true);
+    }
+    if (!nearer && cover_of(t, ref)->length + 1 == MOST_COVERS) {
+        return ref;
+    }
+    return plant(t, p, s->shadow, ref, nearer ? UMB_OCCLUSION_OPEN_CELL : ref);
+}
+
+/* What stands for ref after a fragment has come down to it. */
+static uint32_t insert(const seed *s, uint32_t ref, polygon *p, uint32_t depth)
+{
+    umb_occlusion_tree *t = s->tree;
+    if (is_leaf(ref)) {
+        return insert_in_cell(s, ref, p);
+    }
+    const umb_seen_line *line = t->nodes[ref].line;
+    int8_t side[MOST_CORNERS];
+    sides found = find_sides(t, p, line, side);
+    if (found.unknown || (!found.negative && !found.positive) || depth == MOST_DEPTH) {
+        t->given_up += 1;
+        return ref;
+    }
+    if (!found.negative || !found.positive) {
+        close_edges(p, side);
+        uint32_t below = insert(s, t->nodes[ref].child[found.positive], p, depth + 1);
+        t->nodes[ref].child[found.positive] = below;
+        return close_node(t, ref);
+    }
+    for (int k = 0; k < 2; ++k) {
+        polygon part;
+        if (!cut(p, line, side, k == 0 ? -1 : 1, s->top, &part)) {
+            t->given_up += 1;
+            continue;
+        }
+        uint32_t below = insert(s, t->nodes[ref].child[k], &part, depth + 1);
+        t->nodes[ref].child[k] = below;
+    }
+    return close_node(t, ref);
+}
+
+void umb_occlusion_tree_insert(umb_occlusion_tree *t, uint32_t shadow)
+{
+    umb_seen_corner room[ROOM];
+    const umb_shadow *item = &t->shadows->items[shadow];
+    if (shadow >= UMB_OCCLUSION_TREE_SHADOWS || item->corner_count > MOST_CORNERS || !t->ready) {
+        t->given_up += 1;
+        return;
+    }
+    seed s = {t, shadow, room + ROOM};
+    polygon p = {room, item->corner_count};
+    memcpy(room, t->shadows->corners + item->first_corner, item->corner_count * sizeof *room);
+    t->root = insert(&s, t->root, &p, 0);
+}
+
+void umb_occlusion_tree_begin(umb_occlusion_tree *t, const umb_shadows *shadows, bool modified)
+{
+    t->shadows = shadows;
+    t->modified = modified;
+    t->node_count = t->cover_count = t->member_count = t->given_up = 0;
+    t->root = UMB_OCCLUSION_OPEN_CELL;
+    t->ready = !shadows->viewer.framed || (t->node_capacity >= 4 && t->cover_capacity >= 1);
+    if (!shadows->viewer.framed || !t->ready) {
+        return;
+    }
+    uint32_t beyond = add_cover(t, NULL, 0, UMB_OCCLUSION_OPEN_CELL);
+    for (int i = 0; i < 4; ++i) {
+        t->nodes[t->node_count] = (umb_occlusion_node){&shadows->viewer.frame[i], {beyond, t->root}};
+        t->root = t->node_count++;
+    }
+}
+
+/* ---- asking --------------------------------------------------------------------------------------- */
+
+typedef struct question {
+    const umb_occlusion_tree *tree;
+    const umb_hull *hull;
+    uint32_t first_face, end_face; /* any of which may say that it is beyond an occluder */
+    const umb_seen_corner *top;
+    uint8_t beyond[UMB_OCCLUSION_TREE_SHADOWS]; /* the whole hull: 0 not asked, 1 yes, 2 no */
+} question;
+
+/* True if the part of the hull in a polygon is strictly beyond a plane, by one of its faces. */
+static bool part_beyond(const question *q, const polygon *p, const umb_shadow_plane *plane)
+{
+    for (uint32_t f = q->first_face; f < q->end_face; ++f) {
+        umb_seen_vector depth;
+        umb_hull_depth(&q->tree->shadows->viewer.sight, &q->hull->faces[f].plane, plane, &depth);
+        bool all = true;
+        for (uint32_t i = 0; i < p->count && all; ++i) {
+            const umb_seen_vector *v = &p->corners[i].v;
+            double sum = 0.0, off = 0.0;
+            for (int k = 0; k < 3; ++k) {
+                sum += depth.at[k] * v->at[k];
+                off += fabs(depth.at[k]) * (v->off[k] + 0x1p-50 * fabs(v->at[k])) +
+                       depth.off[k] * (fabs(v->at[k]) + v->off[k]);
+            }
+            all = sum > off * (1.0 + 0x1p-40) + 0x1p-1000;
+        }
+        if (all) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static bool hull_beyond(question *q, uint32_t shadow)
+{
+    const umb_shadows *s = q->tree->shadows;
+    const umb_shadow *item = &s->items[shadow];
+    if (q->beyond[shadow] == 0) {
+        bool all = true;
+        for (uint32_t i = 0; i < item->plane_count && all; ++i) {
+            all = umb_hull_beyond(q->hull, &s->planes[item->first_plane + i]);
+        }
+        q->beyond[shadow] = all || q->hull->nearest > item->farthest ? 1 : 2;
+    }
+    return q->beyond[shadow] == 1;
+}
+
+static bool beyond_cover(question *q, const umb_occlusion_cover *c, const polygon *p)
+{
+    const umb_occlusion_tree *t = q->tree;
+    for (uint32_t i = 0; i < c->count; ++i) {
+        const umb_shadow *item = &t->shadows->items[t->members[c->first + i]];
+        if (hull_beyond(q, t->members[c->first + i])) {
+            continue;
+        }
+        for (uint32_t k = 0; k < item->plane_count; ++k) {
+            if (!part_beyond(q, p, &t->shadows->planes[item->first_plane + k])) {
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+static umb_occlusion_answer ask_cover(question *q, uint32_t ref, const polygon *p)
+{
+    for (; !is_open(ref); ref = cover_of(q->tree, ref)->other) {
+        if (beyond_cover(q, cover_of(q->tree, ref), p)) {
+            return UMB_OCCLUSION_HIDDEN;
+        }
+    }
+    return UMB_OCCLUSION_BEFORE;
+}
+
+/* Until something is found that is not hidden; open cells first. *deepest: as *start, if not NULL. */
+static umb_occlusion_answer filter(question *q, uint32_t ref, const polygon *p, uint32_t *deepest)
+{
+    while (!is_leaf(ref)) {
+        const umb_occlusion_node *n = &q->tree->nodes[ref];
+        int8_t side[MOST_CORNERS];
+        sides s = find_sides(q->tree, p, n->line, side);
+        if (deepest != NULL) {
+            *deepest = ref;
+        }
+        if (s.unknown) {
+            return UMB_OCCLUSION_OPEN;
+        }
+        if (s.negative && s.positive) {
+            if (is_open(n->child[0]) || is_open(n->child[1])) {
+                return UMB_OCCLUSION_OPEN;
+            }
+            for (int k = 0; k < 2; ++k) {
+                polygon part;
+                if (!cut(p, n->line, side, k == 0 ? -1 : 1, q->top, &part)) {
+                    return UMB_OCCLUSION_OPEN;
+                }
+                umb_occlusion_answer answer = filter(q, n->child[k], &part, NULL);
+                if (answer != UMB_OCCLUSION_HIDDEN) {
+                    return answer;
+                }
+            }
+            return UMB_OCCLUSION_HIDDEN;
+        }
+        if (!s.negative && !s.positive) { /* all of it lies on the line, which belongs to both cells */
+            umb_occlusion_answer one = filter(q, n->child[0], p, NULL);
+            return one == UMB_OCCLUSION_HIDDEN ? one : filter(q, n->child[1], p, NULL);
+        }
+        ref = n->child[s.positive];
+    }
+    if (deepest != NULL) {
+        *deepest = ref;
+    }
+    return is_open(ref) ? UMB_OCCLUSION_OPEN : ask_cover(q, ref, p);
+}
+
+umb_occlusion_answer umb_occlusion_tree_ask(const umb_occlusion_tree *t, const umb_hull *hull, uint32_t *start)
+{
+    umb_seen_corner room[ROOM];
+    umb_seen_line lines[4];
+    question q;
+    q.tree = t;
+    q.hull = hull;
+    q.first_face = 0;
+    q.end_face = hull->face_count;
+    q.top = room + ROOM;
+    memset(q.beyond, 0, t->shadows->count < UMB_OCCLUSION_TREE_SHADOWS ? t->shadows->count : UMB_OCCLUSION_TREE_SHADOWS);
+    polygon p = {room, hull->count};
+    memcpy(room, hull->corners, hull->count * sizeof *room);
+    uint32_t from = *start;
+    umb_occlusion_answer answer = filter(&q, from, &p, start);
+    if (answer != UMB_OCCLUSION_BEFORE || hull->face_count < 2) {
+        return answer;
+    }
+    for (uint32_t f = 0; f < hull->face_count; ++f) {
+        /* Each is asked about by itself; if none is in doubt, all are hidden. */
+        q.first_face = f;
+        q.end_face = f + 1;
+        p.count = umb_hull_face_polygon(hull, &t->shadows->viewer, f, lines, room);
+        umb_occlusion_answer face = filter(&q, from, &p, NULL);
+        if (face != UMB_OCCLUSION_HIDDEN) {
+            return face;
+        }
+    }
+    return UMB_OCCLUSION_HIDDEN;
+}

@@ -1,0 +1,317 @@
+/* Bounds of errors are sums over what each term of a product may be off, with 3 units 2^-53 for two products and their
+ * sum (4 for three); PAD covers the roundings of the bound itself, fewer than 64, and LEAST what the smallest
+ * products lose altogether. */
+#include "seen.h"
+
+#include <math.h>
+#include <string.h>
+
+#define U 0x1p-53
+#define PAD (1.0 + 0x1p-40)
+#define LEAST 0x1p-1000
+
+static bool same_point(const float a[3], const float b[3])
+{
+    return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
+}
+
+void umb_seen_prepare(umb_seen_from *s, const double eye[3], const double forward[3], bool parallel, double reach)
+{
+    int exponent = 0;
+    s->parallel = parallel;
+    s->axis = 2;
+    s->exact = true;
+    for (int i = 0; i < 3; ++i) {
+        s->eye[i] = eye[i];
+        s->forward[i] = forward[i];
+        s->axis = fabs(forward[i]) > fabs(forward[s->axis]) ? i : s->axis;
+        reach = fabs(eye[i]) > reach ? fabs(eye[i]) : reach;
+    }
+    (void)frexp(reach, &exponent);
+    s->shift = 104 - exponent;
+    for (int i = 0; i < 3; ++i) {
+        bool whole = umb_bigint_from_double(eye[i], s->shift, &s->eye_whole[i]);
+        bool along = umb_bigint_from_double(forward[i], 104, &s->forward_whole[i]);
+        s->exact = s->exact && whole && (along || !parallel);
+    }
+}
+
+/* a_i b_j - a_j b_i, and its error. */
+static void cross_component(const umb_seen_vector *a, const umb_seen_vector *b, int k, umb_seen_vector *out)
+{
+    int i = (k + 1) % 3, j = (k + 2) % 3;
+    double x = a->at[i] * b->at[j], y = a->at[j] * b->at[i];
+    double off = fabs(a->at[i]) * b->off[j] + a->off[i] * (fabs(b->at[j]) + b->off[j]) +
+                 fabs(a->at[j]) * b->off[i] + a->off[j] * (fabs(b->at[i]) + b->off[i]);
+    out->at[k] = x - y;
+    out->off[k] = (off + 3.0 * U * (fabs(x) + fabs(y))) * PAD + LEAST;
+}
+
+static void cross(const umb_seen_vector *a, const umb_seen_vector *b, umb_seen_vector *out)
+{
+    for (int k = 0; k < 3; ++k) {
+        cross_component(a, b, k, out);
+    }
+}
+
+/* The image of a difference whose components have relative errors of one unit; without the last component of parallel
+ * images. */
+static void image_of_difference(const umb_seen_from *s, const double d[3], umb_seen_vector *out)
+{
+    int k = s->axis, i = (k + 1) % 3, j = (k + 2) % 3;
+    const int axes[2] = {i, j};
+    if (!s->parallel) {
+        for (int n = 0; n < 3; ++n) {
+            out->at[n] = d[n];
+            out->off[n] = U * fabs(d[n]);
+        }
+        return;
+    }
+    for (int n = 0; n < 2; ++n) {
+        double x = d[axes[n]] * s->forward[k], y = d[k] * s->forward[axes[n]];
+        out->at[n] = x - y;
+        out->off[n] = 4.0 * U * (fabs(x) + fabs(y)) + LEAST;
+    }
+    out->at[2] = out->off[2] = 0.0;
+}
+
+void umb_seen_image(const umb_seen_from *s, const float p[3], umb_seen_vector *out)
+{
+    const double d[3] = {p[0] - s->eye[0], p[1] - s->eye[1], p[2] - s->eye[2]};
+    image_of_difference(s, d, out);
+    if (s->parallel) {
+        out->at[2] = s->forward[s->axis];
+    }
+}
+
+/* image(a) x image(b) = image(a) x (image(b) - image(a)): the difference has far smaller errors. */
+void umb_seen_line_through(const umb_seen_from *s, const float a[3], const float b[3], umb_seen_line *out)
+{
+    umb_seen_vector q, step;
+    const double d[3] = {(double)b[0] - a[0], (double)b[1] - a[1], (double)b[2] - a[2]};
+    umb_seen_image(s, a, &q);
+    image_of_difference(s, d, &step);
+    cross(&q, &step, &out->n);
+    memcpy(out->a, a, sizeof out->a);
+    memcpy(out->b, b, sizeof out->b);
+    out->free = false;
+}
+
+void umb_seen_line_free(const double n[3], umb_seen_line *out)
+{
+    int exponent;
+    double most = fmax(fabs(n[0]), fmax(fabs(n[1]), fabs(n[2])));
+    (void)frexp(most, &exponent);
+    for (int k = 0; k < 3; ++k) {
+        out->n.at[k] = most > 0.0 ? ldexp(rint(ldexp(n[k], 53 - exponent)), exponent - 53) : 0.0;
+        out->n.off[k] = 0.0;
+        out->a[k] = out->b[k] = 0.0f;
+    }
+    out->free = true;
+}
+
+void umb_seen_corner_at(const umb_seen_from *s, const float p[3], umb_seen_corner *out)
+{
+    umb_seen_image(s, p, &out->v);
+    memcpy(out->point, p, sizeof out->point);
+    out->first = out->second = NULL;
+    out->sign = 1;
+}
+
+void umb_seen_corner_of(const umb_seen_line *first, const umb_seen_line *second, int sign,
+                         umb_seen_corner *out)
+{
+    cross(&first->n, &second->n, &out->v);
+    if (sign < 0) {
+        for (int k = 0; k < 3; ++k) {
+            out->v.at[k] = -out->v.at[k];
+        }
+    }
+    out->first = first;
+    out->second = second;
+    out->sign = (int8_t)sign;
+}
+
+/* ---- exact sides --------------------------------------------------------------------------------- */
+
+static bool whole_difference(const umb_seen_from *s, const float p[3], umb_bigint out[3])
+{
+    for (int k = 0; k < 3; ++k) {
+        if (!umb_bigint_from_double(p[k], s->shift, &out[k])) {
+            return false;
+        }
+        umb_bigint_add(&out[k], &s->eye_whole[k], -1, &out[k]);
+    }
+    return true;
+}
+
+static void whole_cross_component(const umb_bigint a[3], const umb_bigint b[3], int k, umb_bigint *out)
+{
+    umb_bigint x, y;
+    int i = (k + 1) % 3, j = (k + 2) % 3;
+    umb_bigint_multiply(&a[i], &b[j], &x);
+    umb_bigint_multiply(&a[j], &b[i], &y);
+    umb_bigint_add(&x, &y, -1, out);
+}
+
+static void whole_cross(const umb_bigint a[3], const umb_bigint b[3], umb_bigint out[3])
+{
+    for (int k = 0; k < 3; ++k) {
+        whole_cross_component(a, b, k, &out[k]);
+    }
+}
+
+static bool whole_image(const umb_seen_from *s, const float p[3], umb_bigint out[3])
+{
+    umb_bigint d[3], x, y;
+    if (!s->exact || !whole_difference(s, p, d)) {
+        return false;
+    }
+    if (!s->parallel) {
+        memcpy(out, d, sizeof d);
+        return true;
+    }
+    int k = s->axis;
+    for (int n = 0; n < 2; ++n) {
+        int i = (k + 1 + n) % 3;
+        umb_bigint_multiply(&d[i], &s->forward_whole[k], &x);
+        umb_bigint_multiply(&d[k], &s->forward_whole[i], &y);
+        umb_bigint_add(&x, &y, -1, &out[n]);
+    }
+    /* The first two are whole numbers of 2^-(shift + 104), and so must this be. */
+    umb_bigint unit;
+    if (s->shift < 0 || !umb_bigint_from_double(1.0, s->shift, &unit)) {
+        return false;
+    }
+    umb_bigint_multiply(&s->forward_whole[k], &unit, &out[2]);
+    return true;
+}
+
+static bool whole_line(const umb_seen_from *s, const umb_seen_line *line, umb_bigint out[3])
+{
+    if (line->free) {
+        const double *n = line->n.at;
+        int exponent;
+        (void)frexp(fmax(fabs(n[0]), fmax(fabs(n[1]), fabs(n[2]))), &exponent);
+        bool whole = true;
+        for (int k = 0; k < 3; ++k) {
+            whole = umb_bigint_from_double(n[k], 53 - exponent, &out[k]) && whole;
+        }
+        return whole;
+    }
+    umb_bigint a[3], b[3];
+    if (!whole_image(s, line->a, a) || !whole_image(s, line->b, b)) {
+        return false;
+    }
+    whole_cross(a, b, out);
+    return true;
+}
+
+static bool whole_corner(const umb_seen_from *s, const umb_seen_corner *c, umb_bigint out[3])
+{
+    if (c->first == NULL) {
+        return whole_image(s, c->point, out);
+    }
+    umb_bigint n[3], m[3];
+    if (!whole_line(s, c->first, n) || !whole_line(s, c->second, m)) {
+        return false;
+    }
+    whole_cross(n, m, out);
+    return true;
+}
+
+int umb_seen_side_exact(const umb_seen_from *s, const umb_seen_line *line, const umb_seen_corner *corner)
+{
+    umb_bigint n[3], v[3], sum, product;
+    if (!whole_line(s, line, n) || !whole_corner(s, corner, v)) {
+        return UMB_SEEN_UNKNOWN;
+    }
+    umb_bigint_multiply(&n[0], &v[0], &sum);
+    for (int k = 1; k < 3; ++k) {
+        umb_bigint_multiply(&n[k], &v[k], &product);
+        umb_bigint_add(&sum, &product, 1, &sum);
+    }
+    return sum.sign * corner->sign;
+}
+
+/* ---- sides --------------------------------------------------------------------------------------- */
+
+static bool ends_at(const umb_seen_line *line, const float p[3])
+{
+    return same_point(line->a, p) || same_point(line->b, p);
+}
+
+static bool same_line(const umb_seen_line *a, const umb_seen_line *b)
+{
+    return a == b || (!a->free && !b->free && ends_at(a, b->a) && ends_at(a, b->b) && !same_point(b->a, b->b));
+}
+
+/* Lines and corners made of the same points. */
+static bool surely_on(const umb_seen_line *line, const umb_seen_corner *c)
+{
+    if (c->first == NULL) {
+        return !line->free && ends_at(line, c->point);
+    }
+    if (same_line(line, c->first) || same_line(line, c->second)) {
+        return true;
+    }
+    if (line->free || c->first->free || c->second->free) {
+        return false;
+    }
+    return (ends_at(c->first, line->a) && ends_at(c->second, line->a)) ||
+           (ends_at(c->first, line->b) && ends_at(c->second, line->b));
+}
+
+int umb_seen_side(const umb_seen_from *s, const umb_seen_line *line, const umb_seen_corner *corner)
+{
+    const umb_seen_vector *n = &line->n, *v = &corner->v;
+    double sum = 0.0, size = 0.0, off = 0.0;
+    for (int k = 0; k < 3; ++k) {
+        double x = n->at[k] * v->at[k];
+        sum += x;
+        size += fabs(x);
+        off += fabs(n->at[k]) * v->off[k] + n->off[k] * (fabs(v->at[k]) + v->off[k]);
+    }
+    if (fabs(sum) > (off + 4.0 * U * size) * PAD + LEAST) {
+        return sum > 0.0 ? 1 : -1;
+    }
+    return surely_on(line, corner) ? 0 : umb_seen_side_exact(s, line, corner);
+}
+
+/* ---- cutting -------------------------------------------------------------------------------------- */
+
+/* Where the edge that leaves corner i crosses the line. With q the corner and r the next, on different sides, and e = q
+ * x r the edge: e x n = q.n r - r.n q, up to the order of signs, which is a positive sum of both times q's side. */
+static void crossing(const umb_seen_cut *cut, uint32_t i, umb_seen_corner *out)
+{
+    const umb_seen_corner *c = &cut->in[i];
+    umb_seen_corner_of(c->edge, cut->line, (c->flip ? -1 : 1) * cut->sides[i], out);
+}
+
+uint32_t umb_seen_clip(const umb_seen_cut *cut, int keep, umb_seen_corner *out)
+{
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < cut->count; ++i) {
+        uint32_t j = i + 1 < cut->count ? i + 1 : 0;
+        int here = keep * cut->sides[i], next = keep * cut->sides[j];
+        if (here >= 0) {
+            out[count++] = cut->in[i];
+        }
+        if (here * next < 0) {
+            crossing(cut, i, &out[count++]);
+        }
+        umb_seen_corner *last = count > 0 ? &out[count - 1] : NULL;
+        if (here >= 0 && next < 0) {
+            last->edge = cut->line;
+            last->flip = keep < 0;
+            last->closed = true;
+        } else if (here < 0 && next > 0) {
+            last->edge = cut->in[i].edge;
+            last->flip = cut->in[i].flip;
+            last->closed = cut->in[i].closed;
+        } else if (here == 0 && next == 0) {
+            last->closed = true;
+        }
+    }
+    return count;
+}
