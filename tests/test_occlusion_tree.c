@@ -202,7 +202,7 @@ static uint32_t live_nodes(const umb_occlusion_tree *t, uint32_t ref)
                : 1 + live_nodes(t, t->nodes[ref].child[0]) + live_nodes(t, t->nodes[ref].child[1]);
 }
 
-static void ask_boxes(const umb_occlusion_tree *t, const small_scene *s, uint32_t boxes, tally *sum)
+static void ask_boxes(umb_occlusion_tree *t, const small_scene *s, uint32_t boxes, tally *sum)
 {
     for (uint32_t b = 0; b < boxes; ++b) {
         int low[3] = {between(-12, 10), between(-12, 10), between(1, 20)}, high[3];

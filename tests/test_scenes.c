@@ -17,6 +17,10 @@
 
 #define MAX_RASTERS 3
 
+/* Methods without a raster, which answer beside those of each raster size. */
+static const umb_method OBJECT_SPACE[] = {UMB_METHOD_SHADOW_FRUSTA, UMB_METHOD_OCCLUSION_TREE};
+enum { OBJECT_SPACE_COUNT = sizeof OBJECT_SPACE / sizeof OBJECT_SPACE[0], MAX_ANSWERS = MAX_RASTERS + OBJECT_SPACE_COUNT };
+
 /* How much is looked at. */
 typedef struct effort {
     uint32_t walk_step, nasty_step, ortho_step; /* every so manyth row; nasty: of the nasty ones */
@@ -43,11 +47,34 @@ typedef struct stand {
     model *model;
     umb_scene *built;
     umb_index *index;
-    umb_culler *cullers[MAX_RASTERS], *frustum;
+    umb_culler *cullers[MAX_ANSWERS], *frustum;
     truth *oracle;
     camera_path path;
-    strict_count walk[MAX_RASTERS], nasty[MAX_RASTERS], ortho[MAX_RASTERS];
+    strict_count walk[MAX_ANSWERS], nasty[MAX_ANSWERS], ortho[MAX_ANSWERS];
 } stand;
+
+/* The rasters first, then the others. */
+static uint32_t answer_count(const stand *s)
+{
+    return s->effort->raster_count + OBJECT_SPACE_COUNT;
+}
+
+static umb_method method_of(const stand *s, uint32_t answer)
+{
+    return answer < s->effort->raster_count ? UMB_METHOD_RASTER : OBJECT_SPACE[answer - s->effort->raster_count];
+}
+
+/* What an answer was found with, for people. */
+static const char *title_of(const stand *s, uint32_t answer, char text[32])
+{
+    if (answer < s->effort->raster_count) {
+        const uint32_t *size = s->effort->rasters[answer];
+        (void)snprintf(text, 32, "%ux%u", size[0], size[1]);
+    } else {
+        (void)snprintf(text, 32, "%s", umb_method_name(method_of(s, answer)));
+    }
+    return text;
+}
 
 static const effort *effort_wanted(effort *changed)
 {
@@ -72,8 +99,9 @@ static void set_up(stand *s)
     s->oracle = truth_create(s->model, &error);
     assert_non_null(s->oracle);
     assert_int_equal(umb_index_create(s->built, NULL, &s->index), UMB_OK);
-    for (uint32_t r = 0; r < s->effort->raster_count; ++r) {
-        assert_int_equal(umb_culler_create(s->index, NULL, &s->cullers[r]), UMB_OK);
+    for (uint32_t r = 0; r < answer_count(s); ++r) {
+        umb_culler_def def = {.method = method_of(s, r)};
+        assert_int_equal(umb_culler_create(s->index, &def, &s->cullers[r]), UMB_OK);
     }
     umb_culler_def none = {.method = UMB_METHOD_NONE};
     assert_int_equal(umb_culler_create(s->index, &none, &s->frustum), UMB_OK);
@@ -82,7 +110,7 @@ static void set_up(stand *s)
 static void tear_down(stand *s)
 {
     camera_path_free(&s->path);
-    for (uint32_t r = 0; r < s->effort->raster_count; ++r) {
+    for (uint32_t r = 0; r < answer_count(s); ++r) {
         umb_culler_destroy(s->cullers[r]);
     }
     umb_culler_destroy(s->frustum);
@@ -99,20 +127,20 @@ static void check_row(stand *s, uint32_t row, bool ortho, strict_count *sums)
     assert_true(real_scene_view(s->scene, s->model, s->path.rows[row], ortho, &view));
     assert_int_equal(umb_cull(s->frustum, &view, &seen), UMB_OK);
     uint32_t in_frustum = seen.count;
-    strict_answer answers[MAX_RASTERS];
-    char labels[MAX_RASTERS][128];
-    for (uint32_t r = 0; r < s->effort->raster_count; ++r) {
-        const uint32_t *size = s->effort->rasters[r];
-        view.buffer_width = size[0];
-        view.buffer_height = size[1];
+    strict_answer answers[MAX_ANSWERS];
+    char labels[MAX_ANSWERS][128], title[32];
+    for (uint32_t r = 0; r < answer_count(s); ++r) {
+        if (r < s->effort->raster_count) {
+            view.buffer_width = s->effort->rasters[r][0];
+            view.buffer_height = s->effort->rasters[r][1];
+        }
         assert_int_equal(umb_cull(s->cullers[r], &view, &seen), UMB_OK);
-        (void)snprintf(labels[r], sizeof labels[r], "%s row %u%s at %ux%u", s->scene->name, row,
-                       ortho ? " parallel" : "", size[0], size[1]);
+        (void)snprintf(labels[r], sizeof labels[r], "%s row %u%s, %s", s->scene->name, row, ortho ? " parallel" : "",
+                       title_of(s, r, title));
         answers[r] = (strict_answer){seen.objects, seen.count, labels[r], &sums[r]};
         sums[r].in_frustum += in_frustum;
     }
-    assert_true(strict_check_all(s->oracle, s->model, &view, answers, s->effort->raster_count,
-                                 &s->effort->oracle));
+    assert_true(strict_check_all(s->oracle, s->model, &view, answers, answer_count(s), &s->effort->oracle));
 }
 
 static double mean(uint64_t sum, uint64_t count)
@@ -120,13 +148,13 @@ static double mean(uint64_t sum, uint64_t count)
     return count != 0 ? (double)sum / (double)count : 0.0;
 }
 
-static void say(const stand *s, uint32_t raster, const char *views, const strict_count *c)
+static void say(const stand *s, uint32_t answer, const char *views, const strict_count *c)
 {
-    const uint32_t *size = s->effort->rasters[raster];
-    printf("# %-26s %4ux%-3u %-8s views %3llu in frustum %7.1f reported %6.1f truly visible %6.1f "
+    char title[32];
+    printf("# %-26s %-14s %-8s views %3llu in frustum %7.1f reported %6.1f truly visible %6.1f "
            "wrong %llu "
            "unconfirmed %llu conservativity %.3f\n",
-           s->scene->name, size[0], size[1], views, (unsigned long long)c->views,
+           s->scene->name, title_of(s, answer, title), views, (unsigned long long)c->views,
            mean(c->in_frustum, c->views), mean(c->reported, c->views),
            mean(c->truth_visible, c->views), (unsigned long long)c->wrongly_hidden,
            (unsigned long long)c->unconfirmed, mean(c->reported, c->truth_visible));
@@ -151,13 +179,13 @@ static uint64_t check_scene(const real_scene *scene, const effort *e)
         }
     }
     uint64_t bad = 0;
-    for (uint32_t r = 0; r < e->raster_count; ++r) {
+    for (uint32_t r = 0; r < answer_count(&s); ++r) {
         const strict_count *w = &s.walk[r];
         say(&s, r, "walked", w);
         say(&s, r, "nasty", &s.nasty[r]);
         say(&s, r, "parallel", &s.ortho[r]);
         bad += w->wrongly_hidden + s.nasty[r].wrongly_hidden + s.ortho[r].wrongly_hidden;
-        bool counted = scene->level && e->rasters[r][0] >= 1024 && w->views >= 20;
+        bool counted = scene->level && r < e->raster_count && e->rasters[r][0] >= 1024 && w->views >= 20;
         if (counted && (w->reported > 3 * w->truth_visible || 2 * w->reported > w->in_frustum)) {
             printf(
                 "# %s: reported more than three times what is seen, or than half of the frustum\n",

@@ -33,7 +33,7 @@ static uint64_t first_wanted(void)
 }
 
 /* Methods without a raster; kinds of indices take turns with them. */
-static const umb_method OTHERS[] = {UMB_METHOD_PLANES};
+static const umb_method OTHERS[] = {UMB_METHOD_PLANES, UMB_METHOD_SHADOW_FRUSTA, UMB_METHOD_OCCLUSION_TREE};
 
 /* Kinds of indices beside the first two, which take turns with all sizes. */
 enum { SIZED = 3, MOST = 64, OTHER_COUNT = sizeof OTHERS / sizeof OTHERS[0], KINDS = 32 };

@@ -15,8 +15,11 @@ typedef struct umb_culler umb_culler;
 typedef enum umb_method {
     UMB_METHOD_RASTER = 0, /* strict silhouette raster (docs/conservative.md); the default */
     UMB_METHOD_NONE = 1,   /* frustum culling only */
-    UMB_METHOD_PLANES = 2  /* strict, in object space, no raster: large occluders, chosen first, and their planes
+    UMB_METHOD_PLANES = 2, /* strict, in object space, no raster: large occluders, chosen first, and their planes
                               (Coorg and Teller 1997; Gummerus 5.4) */
+    UMB_METHOD_SHADOW_FRUSTA = 3, /* the same kind: each hides alone, chosen by what it hides (Hudson and others 1997) */
+    UMB_METHOD_OCCLUSION_TREE = 4 /* the same kind: shadows merged into one tree, so that occluders hide together
+                                     whatever they share (Bittner, Havran and Slavik 1998) */
 } umb_method;
 
 /* What a method promises. */

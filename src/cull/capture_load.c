@@ -140,7 +140,7 @@ static umb_result read_frame(loader *l)
     v->far_depth = numbers[5];
     v->min_pixels = numbers[6];
     v->time = numbers[7];
-    if (words[0] > UMB_METHOD_PLANES || !umb_index_name_unpack(words[1], &l->out->index_def) || words[2] > UMB_ORTHOGRAPHIC) {
+    if (words[0] > UMB_METHOD_OCCLUSION_TREE || !umb_index_name_unpack(words[1], &l->out->index_def) || words[2] > UMB_ORTHOGRAPHIC) {
         return fail(l, "unknown method, index or projection");
     }
     l->out->method = (umb_method)words[0];

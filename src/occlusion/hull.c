@@ -60,19 +60,19 @@ static void make_polygon(const umb_hull *h, const umb_shadow_viewer *v, const lo
 {
     for (uint32_t i = 0; i < l->count; ++i) {
         const float *a = h->points[l->corners[i]], *b = h->points[l->corners[i + 1 < l->count ? i + 1 : 0]];
-        umb_seen_line_through(&v->sight, a, b, &lines[i]);
+        umb_seen_line_later(a, b, &lines[i]);
         umb_seen_corner_at(&v->sight, a, &corners[i]);
         corners[i].edge = &lines[i];
         corners[i].flip = corners[i].closed = false;
     }
 }
 
-static void add_face(umb_hull *h, const umb_shadow_viewer *v, const uint8_t face[4])
+static void add_face(umb_hull *h, const uint8_t *corners, uint8_t count)
 {
     umb_hull_face *f = &h->faces[h->face_count++];
-    memcpy(f->loop, face, sizeof f->loop);
-    f->count = 4;
-    umb_shadow_plane_of(&v->sight, h->points[face[2]], h->points[face[1]], h->points[face[0]], &f->plane);
+    memcpy(f->loop, corners, count);
+    f->count = count;
+    f->ready = false;
 }
 
 /* Which faces of an axis-aligned box the viewer sees is decided without error. */
@@ -85,6 +85,20 @@ static int see_axis(const umb_shadow_viewer *v, const umb_aabb *box, int axis)
     return s->eye[axis] < box->min[axis] ? 0 : s->eye[axis] > box->max[axis] ? 2 : 1;
 }
 
+bool umb_hull_points_of_box(umb_hull *h, const umb_shadow_viewer *v, const umb_aabb *box)
+{
+    for (uint32_t i = 0; i < 8; ++i) {
+        for (int k = 0; k < 3; ++k) {
+            h->points[i][k] = (i >> k & 1u) != 0 ? box->max[k] : box->min[k];
+        }
+    }
+    h->point_count = 8;
+    h->box = true;
+    h->count = h->face_count = 0;
+    find_bounds(h, v);
+    return true;
+}
+
 bool umb_hull_of_box(umb_hull *h, const umb_shadow_viewer *v, const umb_aabb *box)
 {
     int row = 0, scale = 1, states[3];
@@ -93,15 +107,7 @@ bool umb_hull_of_box(umb_hull *h, const umb_shadow_viewer *v, const umb_aabb *bo
         row += scale * states[k];
         scale *= 3;
     }
-    for (uint32_t i = 0; i < 8; ++i) {
-        for (int k = 0; k < 3; ++k) {
-            h->points[i][k] = (i >> k & 1u) != 0 ? box->max[k] : box->min[k];
-        }
-    }
-    h->point_count = 8;
-    h->box = true;
-    h->face_count = 0;
-    find_bounds(h, v);
+    (void)umb_hull_points_of_box(h, v, box);
     h->count = OUTLINES[row].count;
     if (h->count == 0 || !in_front(h, v)) {
         return false;
@@ -111,7 +117,7 @@ bool umb_hull_of_box(umb_hull *h, const umb_shadow_viewer *v, const umb_aabb *bo
         int i = (k + 1) % 3, j = (k + 2) % 3;
         bool wide = box->min[i] < box->max[i] && box->min[j] < box->max[j];
         if (states[k] != 1 && wide) { /* one without area is the edge of another */
-            add_face(h, v, FACES[k][states[k] / 2]);
+            add_face(h, FACES[k][states[k] / 2], 4);
         }
     }
     return true;
@@ -123,10 +129,12 @@ bool umb_hull_of_box(umb_hull *h, const umb_shadow_viewer *v, const umb_aabb *bo
 static bool holds_points(const umb_hull *h, const umb_shadow_viewer *v)
 {
     for (uint32_t i = 0; i < h->count; ++i) {
+        umb_seen_line line;
+        umb_seen_line_through(&v->sight, h->lines[i].a, h->lines[i].b, &line);
         for (uint32_t k = 0; k < h->point_count; ++k) {
             umb_seen_corner c;
             umb_seen_corner_at(&v->sight, h->points[k], &c);
-            int side = umb_seen_side(&v->sight, &h->lines[i], &c);
+            int side = umb_seen_side(&v->sight, &line, &c);
             if (side != 0 && side != 1) {
                 return false;
             }
@@ -207,8 +215,7 @@ static bool around(const turned *b, umb_aabb *out)
     return true;
 }
 
-/* As for boxes along the axes, but seen with the accuracy of doubles: what is made of it is tested. */
-static bool find_turned(umb_hull *h, const umb_shadow_viewer *v, const turned *b)
+static bool turned_points(umb_hull *h, const umb_shadow_viewer *v, const turned *b)
 {
     for (uint32_t i = 0; i < 8; ++i) {
         for (int k = 0; k < 3; ++k) {
@@ -222,15 +229,25 @@ static bool find_turned(umb_hull *h, const umb_shadow_viewer *v, const turned *b
             }
         }
     }
+    h->point_count = 8;
+    h->box = false;
+    h->count = h->face_count = 0;
+    find_bounds(h, v);
+    return true;
+}
+
+/* As for boxes along the axes, but seen with the accuracy of doubles: what is made of it is tested. */
+static bool find_turned(umb_hull *h, const umb_shadow_viewer *v, const turned *b)
+{
+    if (!turned_points(h, v, b)) {
+        return false;
+    }
     double det = 0.0;
     for (int i = 0; i < 3; ++i) {
         int j = (i + 1) % 3, l = (i + 2) % 3;
         det += b->half[0][i] * (b->half[1][j] * b->half[2][l] - b->half[1][l] * b->half[2][j]);
     }
     int row = 0, scale = 1;
-    h->point_count = 8;
-    h->box = false;
-    h->face_count = 0;
     for (int k = 0; k < 3; ++k) {
         int state = 1;
         for (int max = 0; max < 2; ++max) {
@@ -253,7 +270,6 @@ static bool find_turned(umb_hull *h, const umb_shadow_viewer *v, const turned *b
         l.corners[i] = l.corners[l.count - 1u - i];
         l.corners[l.count - 1u - i] = swap;
     }
-    find_bounds(h, v);
     h->count = l.count;
     if (l.count == 0 || !in_front(h, v)) {
         return false;
@@ -274,22 +290,40 @@ bool umb_hull_of_turned_box(umb_hull *h, const umb_shadow_viewer *v, const umb_a
     return around(&b, &bounds) && umb_hull_of_box(h, v, &bounds);
 }
 
+bool umb_hull_points_of_turned_box(umb_hull *h, const umb_shadow_viewer *v, const umb_aabb *box, const umb_transform *t)
+{
+    turned b, grown;
+    umb_aabb bounds;
+    turn(box, t, &b);
+    grown = b;
+    return (grow(&grown) && turned_points(h, v, &grown)) ||
+           (around(&b, &bounds) && umb_hull_points_of_box(h, v, &bounds));
+}
+
 /* ---- triangles ------------------------------------------------------------------------------------ */
+
+bool umb_hull_points_of_triangle(umb_hull *h, const umb_shadow_viewer *v, const float corners[3][3])
+{
+    memcpy(h->points, corners, 3 * sizeof h->points[0]);
+    h->point_count = 3;
+    h->box = false;
+    h->count = h->face_count = 0;
+    find_bounds(h, v);
+    return true;
+}
 
 bool umb_hull_of_triangle(umb_hull *h, const umb_shadow_viewer *v, const float corners[3][3])
 {
     static const loop ALONG = {3, {0, 1, 2}}, AGAINST = {3, {2, 1, 0}};
-    memcpy(h->points, corners, 3 * sizeof h->points[0]);
-    h->point_count = 3;
-    h->box = false;
-    h->face_count = 0;
+    (void)umb_hull_points_of_triangle(h, v, corners);
     h->count = 3;
-    find_bounds(h, v);
     if (!in_front(h, v)) {
         return false;
     }
     make_polygon(h, v, &ALONG, h->lines, h->corners);
-    int side = umb_seen_side(&v->sight, &h->lines[0], &h->corners[2]);
+    umb_seen_line line;
+    umb_seen_line_through(&v->sight, h->points[0], h->points[1], &line);
+    int side = umb_seen_side(&v->sight, &line, &h->corners[2]);
     if (side == UMB_SEEN_UNKNOWN) {
         return false;
     }
@@ -297,16 +331,22 @@ bool umb_hull_of_triangle(umb_hull *h, const umb_shadow_viewer *v, const float c
         make_polygon(h, v, &AGAINST, h->lines, h->corners);
     }
     if (side != 0) {
-        umb_hull_face *f = &h->faces[h->face_count++];
-        const loop *l = side < 0 ? &AGAINST : &ALONG;
-        f->count = 3;
-        memcpy(f->loop, l->corners, 3);
-        umb_shadow_plane_of(&v->sight, h->points[f->loop[2]], h->points[f->loop[1]], h->points[f->loop[0]], &f->plane);
+        add_face(h, (side < 0 ? &AGAINST : &ALONG)->corners, 3);
     }
     return true;
 }
 
 /* ---- questions ------------------------------------------------------------------------------------ */
+
+const umb_shadow_plane *umb_hull_face_plane(umb_hull *h, const umb_shadow_viewer *v, uint32_t face)
+{
+    umb_hull_face *f = &h->faces[face];
+    if (!f->ready) {
+        umb_shadow_plane_of(&v->sight, h->points[f->loop[2]], h->points[f->loop[1]], h->points[f->loop[0]], &f->plane);
+        f->ready = true;
+    }
+    return &f->plane;
+}
 
 uint32_t umb_hull_face_polygon(const umb_hull *h, const umb_shadow_viewer *v, uint32_t face, umb_seen_line lines[4],
                                umb_seen_corner corners[4])

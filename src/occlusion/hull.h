@@ -11,6 +11,7 @@ enum { UMB_HULL_CORNERS = 6, UMB_HULL_POINTS = 8, UMB_HULL_FACES = 3 };
 /* A face that looks at the viewer. */
 typedef struct umb_hull_face {
     umb_shadow_plane plane;
+    bool ready;      /* plane is known: umb_hull_face_plane() */
     uint8_t loop[4]; /* points around it, the way polygons run */
     uint8_t count;
 } umb_hull_face;
@@ -37,6 +38,12 @@ bool umb_hull_of_box(umb_hull *h, const umb_shadow_viewer *v, const umb_aabb *bo
 bool umb_hull_of_turned_box(umb_hull *h, const umb_shadow_viewer *v, const umb_aabb *box, const umb_transform *t);
 bool umb_hull_of_triangle(umb_hull *h, const umb_shadow_viewer *v, const float corners[3][3]);
 
+/* The same bodies, their points and bounds alone. False if they have no finite corners. */
+bool umb_hull_points_of_box(umb_hull *h, const umb_shadow_viewer *v, const umb_aabb *box);
+bool umb_hull_points_of_turned_box(umb_hull *h, const umb_shadow_viewer *v, const umb_aabb *box, const umb_transform *t);
+bool umb_hull_points_of_triangle(umb_hull *h, const umb_shadow_viewer *v, const float corners[3][3]);
+
+const umb_shadow_plane *umb_hull_face_plane(umb_hull *h, const umb_shadow_viewer *v, uint32_t face);
 /* The polygon of one of its faces; lines: room for four. */
 uint32_t umb_hull_face_polygon(const umb_hull *h, const umb_shadow_viewer *v, uint32_t face, umb_seen_line lines[4],
                                umb_seen_corner corners[4]);

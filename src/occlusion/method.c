@@ -9,6 +9,10 @@ const umb_method_ops *umb_method_get(umb_method method)
         return &umb_raster_method;
     case UMB_METHOD_PLANES:
         return &umb_planes_method;
+    case UMB_METHOD_SHADOW_FRUSTA:
+        return &umb_shadow_frusta_method;
+    case UMB_METHOD_OCCLUSION_TREE:
+        return &umb_occlusion_tree_method;
     case UMB_METHOD_NONE:
         break;
     }
@@ -24,6 +28,10 @@ const char *umb_method_name(umb_method method)
         return "none";
     case UMB_METHOD_PLANES:
         return "planes";
+    case UMB_METHOD_SHADOW_FRUSTA:
+        return "shadow-frusta";
+    case UMB_METHOD_OCCLUSION_TREE:
+        return "occlusion-tree";
     }
     return "unknown";
 }

@@ -116,5 +116,7 @@ typedef struct umb_method_ops {
 const umb_method_ops *umb_method_get(umb_method method);
 
 extern const umb_method_ops umb_raster_method;
+extern const umb_method_ops umb_shadow_frusta_method;
+extern const umb_method_ops umb_occlusion_tree_method;
 
 #endif

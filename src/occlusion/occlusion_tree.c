@@ -91,14 +91,14 @@ static void close_edges(polygon *p, const int8_t *side)
 }
 
 /* The part on one side, written behind the polygon; false if the room ends before top does. */
-static bool cut(const polygon *p, const umb_seen_line *line, const int8_t *side, int keep, const umb_seen_corner *top,
-                polygon *out)
+static bool cut(const umb_occlusion_tree *t, const polygon *p, umb_seen_line *line, const int8_t *side, int keep,
+                const umb_seen_corner *top, polygon *out)
 {
     out->corners = p->corners + p->count;
     if (out->corners + p->count + 2 > top || p->count + 2 > MOST_CORNERS) {
         return false;
     }
-    umb_seen_cut c = {line, p->corners, side, p->count};
+    umb_seen_cut c = {&t->shadows->viewer.sight, line, p->corners, side, p->count};
     out->count = umb_seen_clip(&c, keep, out->corners);
     return true;
 }
@@ -206,6 +206,7 @@ static uint32_t plant(umb_occlusion_tree *t, const polygon *p, uint32_t shadow, 
         n->child[c->flip ? 1 : 0] = outside;
         below = t->node_count++;
     }
+    t->planted += 1;
     return below;
 }
 
@@ -243,7 +244,7 @@ static uint32_t insert(const seed *s, uint32_t ref, polygon *p, uint32_t depth)
     if (is_leaf(ref)) {
         return insert_in_cell(s, ref, p);
     }
-    const umb_seen_line *line = t->nodes[ref].line;
+    umb_seen_line *line = t->nodes[ref].line;
     int8_t side[MOST_CORNERS];
     sides found = find_sides(t, p, line, side);
     if (found.unknown || (!found.negative && !found.positive) || depth == MOST_DEPTH) {
@@ -258,7 +259,7 @@ static uint32_t insert(const seed *s, uint32_t ref, polygon *p, uint32_t depth)
     }
     for (int k = 0; k < 2; ++k) {
         polygon part;
-        if (!cut(p, line, side, k == 0 ? -1 : 1, s->top, &part)) {
+        if (!cut(t, p, line, side, k == 0 ? -1 : 1, s->top, &part)) {
             t->given_up += 1;
             continue;
         }
@@ -282,11 +283,11 @@ void umb_occlusion_tree_insert(umb_occlusion_tree *t, uint32_t shadow)
     t->root = insert(&s, t->root, &p, 0);
 }
 
-void umb_occlusion_tree_begin(umb_occlusion_tree *t, const umb_shadows *shadows, bool modified)
+void umb_occlusion_tree_begin(umb_occlusion_tree *t, umb_shadows *shadows, bool modified)
 {
     t->shadows = shadows;
     t->modified = modified;
-    t->node_count = t->cover_count = t->member_count = t->given_up = 0;
+    t->node_count = t->cover_count = t->member_count = t->planted = t->given_up = 0;
     t->root = UMB_OCCLUSION_OPEN_CELL;
     t->ready = !shadows->viewer.framed || (t->node_capacity >= 4 && t->cover_capacity >= 1);
     if (!shadows->viewer.framed || !t->ready) {
@@ -303,8 +304,9 @@ void umb_occlusion_tree_begin(umb_occlusion_tree *t, const umb_shadows *shadows,
 
 typedef struct question {
     const umb_occlusion_tree *tree;
-    const umb_hull *hull;
+    umb_hull *hull;
     uint32_t first_face, end_face; /* any of which may say that it is beyond an occluder */
+    bool whole; /* side_of_box() may be asked while nothing is cut off */
     const umb_seen_corner *top;
     uint8_t beyond[UMB_OCCLUSION_TREE_SHADOWS]; /* the whole hull: 0 not asked, 1 yes, 2 no */
 } question;
@@ -314,15 +316,16 @@ static bool part_beyond(const question *q, const polygon *p, const umb_shadow_pl
 {
     for (uint32_t f = q->first_face; f < q->end_face; ++f) {
         umb_seen_vector depth;
-        umb_hull_depth(&q->tree->shadows->viewer.sight, &q->hull->faces[f].plane, plane, &depth);
+        const umb_shadow_viewer *v = &q->tree->shadows->viewer;
+        umb_hull_depth(&v->sight, umb_hull_face_plane(q->hull, v, f), plane, &depth);
         bool all = true;
         for (uint32_t i = 0; i < p->count && all; ++i) {
-            const umb_seen_vector *v = &p->corners[i].v;
+            const umb_seen_vector *at = &p->corners[i].v;
             double sum = 0.0, off = 0.0;
             for (int k = 0; k < 3; ++k) {
-                sum += depth.at[k] * v->at[k];
-                off += fabs(depth.at[k]) * (v->off[k] + 0x1p-50 * fabs(v->at[k])) +
-                       depth.off[k] * (fabs(v->at[k]) + v->off[k]);
+                sum += depth.at[k] * at->at[k];
+                off += fabs(depth.at[k]) * (at->off[k] + 0x1p-50 * fabs(at->at[k])) +
+                       depth.off[k] * (fabs(at->at[k]) + at->off[k]);
             }
             all = sum > off * (1.0 + 0x1p-40) + 0x1p-1000;
         }
@@ -374,16 +377,51 @@ static umb_occlusion_answer ask_cover(question *q, uint32_t ref, const polygon *
     return UMB_OCCLUSION_BEFORE;
 }
 
+/* 1 or -1: a box along the axes is surely all on that side of a line, by its middle and half its size; 0 says nothing.
+ * Fewer steps than to look at its corners. */
+static int side_of_box(const question *q, const umb_seen_line *line)
+{
+    const umb_seen_from *from = &q->tree->shadows->viewer.sight;
+    const umb_aabb *b = &q->hull->bounds;
+    double sum = 0.0, room = 0.0;
+    for (int k = 0; k < 3; ++k) {
+        double low = (double)b->min[k] - from->eye[k], high = (double)b->max[k] - from->eye[k], n = line->n.at[k];
+        sum += n * (low + high);
+        room += fabs(n) * (high - low) + (line->n.off[k] + 0x1p-49 * fabs(n)) * (fabs(low) + fabs(high));
+    }
+    room = room * (1.0 + 0x1p-40) + 0x1p-990;
+    return sum > room ? 1 : sum < -room ? -1 : 0;
+}
+
+bool umb_occlusion_tree_open_at(const umb_occlusion_tree *t, const float p[3], uint32_t start)
+{
+    umb_seen_corner c;
+    umb_seen_corner_at(&t->shadows->viewer.sight, p, &c);
+    while (!is_leaf(start)) {
+        int side = umb_seen_side(&t->shadows->viewer.sight, t->nodes[start].line, &c);
+        if (side != 1 && side != -1) {
+            return false;
+        }
+        start = t->nodes[start].child[side > 0];
+    }
+    return is_open(start);
+}
+
 /* Until something is found that is not hidden; open cells first. *deepest: as *start, if not NULL. */
 static umb_occlusion_answer filter(question *q, uint32_t ref, const polygon *p, uint32_t *deepest)
 {
     while (!is_leaf(ref)) {
         const umb_occlusion_node *n = &q->tree->nodes[ref];
         int8_t side[MOST_CORNERS];
-        sides s = find_sides(q->tree, p, n->line, side);
         if (deepest != NULL) {
             *deepest = ref;
+            int all = q->whole ? side_of_box(q, n->line) : 0;
+            if (all != 0) {
+                ref = n->child[all > 0];
+                continue;
+            }
         }
+        sides s = find_sides(q->tree, p, n->line, side);
         if (s.unknown) {
             return UMB_OCCLUSION_OPEN;
         }
@@ -393,7 +431,7 @@ static umb_occlusion_answer filter(question *q, uint32_t ref, const polygon *p, 
             }
             for (int k = 0; k < 2; ++k) {
                 polygon part;
-                if (!cut(p, n->line, side, k == 0 ? -1 : 1, q->top, &part)) {
+                if (!cut(q->tree, p, n->line, side, k == 0 ? -1 : 1, q->top, &part)) {
                     return UMB_OCCLUSION_OPEN;
                 }
                 umb_occlusion_answer answer = filter(q, n->child[k], &part, NULL);
@@ -415,7 +453,7 @@ static umb_occlusion_answer filter(question *q, uint32_t ref, const polygon *p, 
     return is_open(ref) ? UMB_OCCLUSION_OPEN : ask_cover(q, ref, p);
 }
 
-umb_occlusion_answer umb_occlusion_tree_ask(const umb_occlusion_tree *t, const umb_hull *hull, uint32_t *start)
+umb_occlusion_answer umb_occlusion_tree_ask(const umb_occlusion_tree *t, umb_hull *hull, uint32_t *start)
 {
     umb_seen_corner room[ROOM];
     umb_seen_line lines[4];
@@ -424,6 +462,7 @@ umb_occlusion_answer umb_occlusion_tree_ask(const umb_occlusion_tree *t, const u
     q.hull = hull;
     q.first_face = 0;
     q.end_face = hull->face_count;
+    q.whole = hull->box && !t->shadows->viewer.sight.parallel;
     q.top = room + ROOM;
     memset(q.beyond, 0, t->shadows->count < UMB_OCCLUSION_TREE_SHADOWS ? t->shadows->count : UMB_OCCLUSION_TREE_SHADOWS);
     polygon p = {room, hull->count};

@@ -25,7 +25,7 @@
 #define UMB_OCCLUSION_COVERED 0x80000000u
 
 typedef struct umb_occlusion_node {
-    const umb_seen_line *line;
+    umb_seen_line *line;
     uint32_t child[2]; /* on the negative and on the positive side */
 } umb_occlusion_node;
 
@@ -37,7 +37,7 @@ typedef struct umb_occlusion_cover {
 } umb_occlusion_cover;
 
 typedef struct umb_occlusion_tree {
-    const umb_shadows *shadows;
+    umb_shadows *shadows;
     umb_occlusion_node *nodes;
     umb_occlusion_cover *covers;
     uint32_t *members; /* shadows */
@@ -45,6 +45,7 @@ typedef struct umb_occlusion_tree {
     uint32_t node_count, cover_count, member_count;
     uint32_t root;
     bool modified, ready;
+    uint32_t planted;  /* fragments that covered a cell, or covered it from nearer */
     uint32_t given_up; /* fragments that were left out because a side was unknown or room was short */
 } umb_occlusion_tree;
 
@@ -60,12 +61,14 @@ bool umb_occlusion_tree_reserve(umb_occlusion_tree *t, const umb_allocator *a, u
 void umb_occlusion_tree_free(umb_occlusion_tree *t, const umb_allocator *a);
 
 /* An empty tree: all is open, but what is beyond the viewer's frame. The shadows stay with the caller. */
-void umb_occlusion_tree_begin(umb_occlusion_tree *t, const umb_shadows *shadows, bool modified);
+void umb_occlusion_tree_begin(umb_occlusion_tree *t, umb_shadows *shadows, bool modified);
 /* Insert one shadow. Nearest first is best: what lies behind others is then left out. */
 void umb_occlusion_tree_insert(umb_occlusion_tree *t, uint32_t shadow);
 /* Ask about a hull, starting at a node (root, or what *start became in a question about something that holds this one):
  * first its outline, then, if only depth was in doubt, each of its faces. *start becomes the deepest node in one of
  * whose cells all of it lies. Threads: any number at once. */
-umb_occlusion_answer umb_occlusion_tree_ask(const umb_occlusion_tree *t, const umb_hull *hull, uint32_t *start);
+umb_occlusion_answer umb_occlusion_tree_ask(const umb_occlusion_tree *t, umb_hull *hull, uint32_t *start);
+/* True if a point is surely in an open cell. */
+bool umb_occlusion_tree_open_at(const umb_occlusion_tree *t, const float p[3], uint32_t start);
 
 #endif

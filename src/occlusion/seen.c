@@ -85,16 +85,28 @@ void umb_seen_image(const umb_seen_from *s, const float p[3], umb_seen_vector *o
 }
 
 /* image(a) x image(b) = image(a) x (image(b) - image(a)): the difference has far smaller errors. */
-void umb_seen_line_through(const umb_seen_from *s, const float a[3], const float b[3], umb_seen_line *out)
+static void make_ready(const umb_seen_from *s, umb_seen_line *line)
 {
     umb_seen_vector q, step;
+    const float *a = line->a, *b = line->b;
     const double d[3] = {(double)b[0] - a[0], (double)b[1] - a[1], (double)b[2] - a[2]};
     umb_seen_image(s, a, &q);
     image_of_difference(s, d, &step);
-    cross(&q, &step, &out->n);
+    cross(&q, &step, &line->n);
+    line->ready = true;
+}
+
+void umb_seen_line_later(const float a[3], const float b[3], umb_seen_line *out)
+{
     memcpy(out->a, a, sizeof out->a);
     memcpy(out->b, b, sizeof out->b);
-    out->free = false;
+    out->free = out->ready = false;
+}
+
+void umb_seen_line_through(const umb_seen_from *s, const float a[3], const float b[3], umb_seen_line *out)
+{
+    umb_seen_line_later(a, b, out);
+    make_ready(s, out);
 }
 
 void umb_seen_line_free(const double n[3], umb_seen_line *out)
@@ -107,7 +119,7 @@ void umb_seen_line_free(const double n[3], umb_seen_line *out)
         out->n.off[k] = 0.0;
         out->a[k] = out->b[k] = 0.0f;
     }
-    out->free = true;
+    out->free = out->ready = true;
 }
 
 void umb_seen_corner_at(const umb_seen_from *s, const float p[3], umb_seen_corner *out)
@@ -285,6 +297,9 @@ int umb_seen_side(const umb_seen_from *s, const umb_seen_line *line, const umb_s
 static void crossing(const umb_seen_cut *cut, uint32_t i, umb_seen_corner *out)
 {
     const umb_seen_corner *c = &cut->in[i];
+    if (!c->edge->ready) {
+        make_ready(cut->from, c->edge);
+    }
     umb_seen_corner_of(c->edge, cut->line, (c->flip ? -1 : 1) * cut->sides[i], out);
 }
 

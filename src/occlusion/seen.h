@@ -39,6 +39,7 @@ typedef struct umb_seen_line {
     umb_seen_vector n;
     float a[3], b[3]; /* n is image(a) x image(b) */
     bool free;        /* it is made of no points: n is exact */
+    bool ready;       /* n is known; cutting finds it when it wants it */
 } umb_seen_line;
 
 /* A corner of a convex polygon of the picture, and the edge that leaves it. Polygons run so that their inside is on the
@@ -46,7 +47,7 @@ typedef struct umb_seen_line {
 typedef struct umb_seen_corner {
     umb_seen_vector v;
     const umb_seen_line *first, *second; /* v = sign first x second; NULL: the image of a point */
-    const umb_seen_line *edge;
+    umb_seen_line *edge;
     float point[3];
     int8_t sign;
     bool flip;   /* the edge's positive side is its line's negative one */
@@ -59,6 +60,8 @@ void umb_seen_prepare(umb_seen_from *s, const double eye[3], const double forwar
 
 void umb_seen_image(const umb_seen_from *s, const float p[3], umb_seen_vector *out);
 void umb_seen_line_through(const umb_seen_from *s, const float a[3], const float b[3], umb_seen_line *out);
+/* The same, without n. */
+void umb_seen_line_later(const float a[3], const float b[3], umb_seen_line *out);
 /* The line of a linear function of q, which loses up to 2^-53 of its largest component. */
 void umb_seen_line_free(const double n[3], umb_seen_line *out);
 /* A corner at a point, without its edge. */
@@ -74,7 +77,8 @@ int umb_seen_side_exact(const umb_seen_from *s, const umb_seen_line *line, const
 
 /* A cut of a polygon by a line, on whose sides (never unknown) its corners are. */
 typedef struct umb_seen_cut {
-    const umb_seen_line *line;
+    const umb_seen_from *from;
+    umb_seen_line *line;
     const umb_seen_corner *in;
     const int8_t *sides;
     uint32_t count;

@@ -255,7 +255,7 @@ static bool add_lines(umb_shadows *s, const umb_shadow_front *front, bool cut, u
 /* ---- the polygon --------------------------------------------------------------------------------- */
 
 /* True if the edges make one loop of a convex polygon, which is then in corners. */
-static bool find_loop(const umb_seen_from *sight, const umb_seen_line *lines, uint32_t count, umb_seen_corner *corners)
+static bool find_loop(const umb_seen_from *sight, umb_seen_line *lines, uint32_t count, umb_seen_corner *corners)
 {
     for (uint32_t i = 0; i < count; ++i) {
         const umb_seen_line *next = &lines[i + 1 < count ? i + 1 : 0];
@@ -280,7 +280,7 @@ static bool find_loop(const umb_seen_from *sight, const umb_seen_line *lines, ui
 }
 
 /* Cut the frame down to what is inside of all lines; 0: nothing is, or that cannot be told. */
-static uint32_t cut_frame(const umb_shadow_viewer *v, const umb_seen_line *lines, uint32_t count,
+static uint32_t cut_frame(const umb_shadow_viewer *v, umb_seen_line *lines, uint32_t count,
                           umb_seen_corner *out)
 {
     umb_seen_corner room[2][UMB_SHADOW_LINES + 8];
@@ -302,7 +302,7 @@ static uint32_t cut_frame(const umb_shadow_viewer *v, const umb_seen_line *lines
             return 0;
         }
         if (outside) {
-            umb_seen_cut cut = {&lines[i], room[now], sides, corner_count};
+            umb_seen_cut cut = {&v->sight, &lines[i], room[now], sides, corner_count};
             corner_count = umb_seen_clip(&cut, 1, room[1 - now]);
             now = 1 - now;
         }
@@ -333,7 +333,7 @@ umb_shadow_result umb_shadows_add(umb_shadows *s, const umb_shadow_front *front,
         s->corner_count + (size_t)item.line_count + 4 > s->corner_capacity) {
         return UMB_SHADOW_NOTHING;
     }
-    const umb_seen_line *lines = s->lines + item.first_line;
+    umb_seen_line *lines = s->lines + item.first_line;
     umb_seen_corner *corners = s->corners + s->corner_count;
     item.corner_count = !cut && find_loop(&v->sight, lines, item.line_count, corners)
                             ? item.line_count

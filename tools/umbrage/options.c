@@ -233,13 +233,13 @@ static const char *read_every(options *o, const char *text)
 
 static const char *read_method(options *o, const char *text)
 {
-    for (int m = UMB_METHOD_RASTER; m <= UMB_METHOD_PLANES; ++m) {
+    for (int m = UMB_METHOD_RASTER; m <= UMB_METHOD_OCCLUSION_TREE; ++m) {
         if (strcmp(text, umb_method_name((umb_method)m)) == 0) {
             o->method = (umb_method)m;
             return NULL;
         }
     }
-    return "one of raster, none, planes";
+    return "one of raster, none, planes, shadow-frusta, occlusion-tree";
 }
 
 static const char *read_index(options *o, const char *text)
@@ -472,7 +472,7 @@ static const option_spec specs[] = {
     {"far", 0, VIEWS, "D|inf", read_far,
      "depth of the far plane (default: the scene's farthest corner)"},
 
-    {"method", 0, VIEWS, "NAME", read_method, "raster; planes: large occluders; none: frustum only (default raster)"},
+    {"method", 0, VIEWS, "NAME", read_method, "raster; planes, shadow-frusta, occlusion-tree: large occluders; none: frustum only (default raster)"},
     {"index", 0, SCENES, "NAME", read_index, "bvh, flat, kdtree, octree, quadtree, bsp, grid: how objects are found (default bvh)"},
     {"buffer", 0, VIEWS, "WxH", read_buffer, "the method's own raster (default 1024x288)"},
     {"coherence", 0, MANY_VIEWS, "NAMES", read_coherence,
