@@ -5,11 +5,6 @@
 /* Objects looked at for each sample wanted. */
 #define LOOKS 8
 
-static umb_aabb object_box(const umb_choice *c, uint32_t i)
-{
-    return c->scene->objects[c->tree->objects[i]].bounds;
-}
-
 /* Eight boxes side by side; those from count on are copies of the first. */
 static void fill_node(umb_node *node, const umb_aabb *boxes, uint32_t count)
 {
@@ -25,7 +20,7 @@ static void fill_node(umb_node *node, const umb_aabb *boxes, uint32_t count)
 
 static uint32_t find_in_view(const umb_choice *c, const umb_box_kernels *kernels, umb_aabb samples[UMB_POWER_SAMPLES])
 {
-    uint32_t looks = LOOKS * UMB_POWER_SAMPLES, all = c->tree->object_count, count = 0;
+    uint32_t looks = LOOKS * UMB_POWER_SAMPLES, all = c->scene->object_count, count = 0;
     uint64_t step = all > looks ? ((uint64_t)all << 16) / looks : 1u << 16;
     for (uint64_t at = 0; at >> 16 < all && count < UMB_POWER_SAMPLES;) {
         umb_aabb boxes[UMB_NODE_WIDTH];
@@ -33,7 +28,9 @@ static uint32_t find_in_view(const umb_choice *c, const umb_box_kernels *kernels
         uint16_t left[UMB_NODE_WIDTH];
         uint32_t n = 0;
         for (; n < UMB_NODE_WIDTH && at >> 16 < all; at += step) {
-            boxes[n++] = object_box(c, (uint32_t)(at >> 16));
+            const umb_object *o = &c->scene->objects[at >> 16];
+            boxes[n] = o->bounds;
+            n += o->live;
         }
         fill_node(&node, boxes, n);
         uint32_t out = umb_frustum_test_node(c->frustum, kernels, &node, c->frustum->all_planes, NULL, left);

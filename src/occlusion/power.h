@@ -15,7 +15,7 @@ typedef struct umb_power {
     uint32_t sample_count;
 } umb_power;
 
-/* Sample up to UMB_POWER_SAMPLES objects in view, evenly over the tree's list of them. */
+/* Sample up to UMB_POWER_SAMPLES objects in view, evenly over their ids: whatever the index. */
 void umb_power_sample(umb_power *p, const umb_choice *choice, const umb_box_kernels *boxes,
                       const umb_planes_kernels *planes, const umb_blockers *blockers);
 
