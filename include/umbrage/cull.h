@@ -49,8 +49,9 @@ typedef enum umb_coherence {
     UMB_COHERENCE_CONSERVATIVE = 1u << 3,
     /* An occluder that covered nothing new when it was last drawn rests for 1, 2, 4, then 8 frames, as long as its
        image stays much where and what it was; convex ones, which are cheap, do not. May report more.
-       UMB_METHOD_PLANES: one that was chosen and hid nothing, convex or not, makes room for others as long; it
-       knows no other switch. */
+       UMB_METHOD_PLANES and UMB_METHOD_SHADOW_FRUSTA: one that was chosen and hid nothing, convex or not, makes room
+       for others as long. Methods that choose their occluders first know no other switch, but for
+       UMB_COHERENCE_LIST with UMB_METHOD_SHADOW_FRUSTA: those that hid most in the last frame are chosen first. */
     UMB_COHERENCE_REST = 1u << 4,
     UMB_COHERENCE_ALL = (1u << 5) - 1
 } umb_coherence;
@@ -73,8 +74,10 @@ typedef struct umb_culler_def {
     uint32_t coherence;
     /* Draw at most so many occluders in a frame, those with the best score: the area of the image of their box,
        times how often their drawing changed anything of late. What score it takes is learned from frame to frame;
-       the first frame draws the nearest. 0: no limit. UMB_METHOD_PLANES chooses so many for each frame by how
-       large they look, 0: 64; at most 65534. */
+       the first frame draws the nearest. 0: no limit. Methods that choose first take so many for each
+       frame: UMB_METHOD_PLANES by how large they look, 0: 64, at most 65534; UMB_METHOD_SHADOW_FRUSTA by what they hide of
+       objects sampled in view, 0: 64, at most 16384; UMB_METHOD_OCCLUSION_TREE by how large they look where no other
+       hides them, 0: 128, at most 512. */
     uint32_t occluder_budget;
     /* Do not put the answer in order: objects come as they are found, the same ones as in order, in an order that
        depends on the scene, the index and the view alone. What lies below a node wholly inside the frustum is then
@@ -141,7 +144,7 @@ UMB_API umb_result umb_cull(umb_culler *culler, const umb_view *view, umb_visibl
 UMB_API bool umb_culler_read_buffer(const umb_culler *culler, float *pixels, size_t capacity,
                                     uint32_t *width, uint32_t *height);
 
-/* "raster", "none", "planes"; "strict", "pixel", "approximate". */
+/* "raster", "none", "planes", "shadow-frusta", "occlusion-tree"; "strict", "pixel", "approximate". */
 UMB_API const char *umb_method_name(umb_method method);
 UMB_API const char *umb_class_name(umb_class class_);
 

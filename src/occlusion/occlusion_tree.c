@@ -306,7 +306,7 @@ typedef struct question {
     const umb_occlusion_tree *tree;
     umb_hull *hull;
     uint32_t first_face, end_face; /* any of which may say that it is beyond an occluder */
-    bool whole; /* side_of_box() may be asked while nothing is cut off */
+    bool whole; /* side_of_bounds() may be asked while nothing is cut off */
     const umb_seen_corner *top;
     uint8_t beyond[UMB_OCCLUSION_TREE_SHADOWS]; /* the whole hull: 0 not asked, 1 yes, 2 no */
 } question;
@@ -377,9 +377,9 @@ static umb_occlusion_answer ask_cover(question *q, uint32_t ref, const polygon *
     return UMB_OCCLUSION_BEFORE;
 }
 
-/* 1 or -1: a box along the axes is surely all on that side of a line, by its middle and half its size; 0 says nothing.
+/* 1 or -1: the hull is surely all on that side of a line, by the middle of its bounds and half their size; 0 says nothing.
  * Fewer steps than to look at its corners. */
-static int side_of_box(const question *q, const umb_seen_line *line)
+static int side_of_bounds(const question *q, const umb_seen_line *line)
 {
     const umb_seen_from *from = &q->tree->shadows->viewer.sight;
     const umb_aabb *b = &q->hull->bounds;
@@ -415,7 +415,7 @@ static umb_occlusion_answer filter(question *q, uint32_t ref, const polygon *p, 
         int8_t side[MOST_CORNERS];
         if (deepest != NULL) {
             *deepest = ref;
-            int all = q->whole ? side_of_box(q, n->line) : 0;
+            int all = q->whole ? side_of_bounds(q, n->line) : 0;
             if (all != 0) {
                 ref = n->child[all > 0];
                 continue;
@@ -462,7 +462,7 @@ umb_occlusion_answer umb_occlusion_tree_ask(const umb_occlusion_tree *t, umb_hul
     q.hull = hull;
     q.first_face = 0;
     q.end_face = hull->face_count;
-    q.whole = hull->box && !t->shadows->viewer.sight.parallel;
+    q.whole = !t->shadows->viewer.sight.parallel;
     q.top = room + ROOM;
     memset(q.beyond, 0, t->shadows->count < UMB_OCCLUSION_TREE_SHADOWS ? t->shadows->count : UMB_OCCLUSION_TREE_SHADOWS);
     polygon p = {room, hull->count};

@@ -10,6 +10,7 @@
 
 /* Occluders that are chosen if nothing is said. */
 #define OCCLUDERS 128
+#define MOST (UMB_OCCLUSION_TREE_SHADOWS / (TRIES * FRONTS_EACH))
 /* So many are looked at for each that covers something. */
 #define TRIES 2
 /* Of one occluder: fronts and edges, on average, when the near plane cuts none of many. What has no room is left out. */
@@ -85,7 +86,7 @@ static umb_result choose(void *state, const umb_choice *choice)
 {
     method *m = state;
     uint32_t budget = choice->budget != 0 ? choice->budget : OCCLUDERS, taken = 0;
-    budget = budget < UMB_OCCLUSION_TREE_SHADOWS ? budget : UMB_OCCLUSION_TREE_SHADOWS;
+    budget = budget < MOST ? budget : MOST;
     m->choice = choice;
     umb_pick pick;
     if (!reserve(m, budget) || umb_select_begin(&m->selector, choice, m->kernels) != UMB_OK) {
