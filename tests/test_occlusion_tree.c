@@ -205,7 +205,7 @@ static uint32_t live_nodes(const umb_occlusion_tree *t, uint32_t ref)
 static void ask_boxes(umb_occlusion_tree *t, const small_scene *s, uint32_t boxes, tally *sum)
 {
     for (uint32_t b = 0; b < boxes; ++b) {
-        int low[3] = {between(-12, 10), between(-12, 10), between(1, 20)}, high[3];
+        int low[3] = {between(-12, 10), between(-12, 10), between(2, 20)}, high[3]; /* in view */
         umb_aabb box;
         for (int k = 0; k < 3; ++k) {
             high[k] = low[k] + between(0, 6);

@@ -7,7 +7,7 @@
 #include "geometry/orient.h"
 
 /* Corners of all fragments on the way down from a polygon, while it is inserted or asked about. */
-enum { ROOM = 640, MOST_CORNERS = UMB_SHADOW_LINES + 8, MOST_MEMBERS = 12, MOST_DEPTH = 1000, MOST_COVERS = 4 };
+enum { ROOM = 640, MOST_CORNERS = UMB_SHADOW_LINES + 8, MOST_MEMBERS = 12, MOST_DEPTH = 1000, MOST_COVERS = 4, MOST_DETOURS = 6 };
 
 typedef struct polygon {
     umb_seen_corner *corners;
@@ -306,7 +306,7 @@ typedef struct question {
     const umb_occlusion_tree *tree;
     umb_hull *hull;
     uint32_t first_face, end_face; /* any of which may say that it is beyond an occluder */
-    bool whole; /* side_of_bounds() may be asked while nothing is cut off */
+    uint32_t detours; /* that may still be taken */
     const umb_seen_corner *top;
     uint8_t beyond[UMB_OCCLUSION_TREE_SHADOWS]; /* the whole hull: 0 not asked, 1 yes, 2 no */
 } question;
@@ -407,50 +407,78 @@ bool umb_occlusion_tree_open_at(const umb_occlusion_tree *t, const float p[3], u
     return is_open(start);
 }
 
-/* Until something is found that is not hidden; open cells first. *deepest: as *start, if not NULL. */
-static umb_occlusion_answer filter(question *q, uint32_t ref, const polygon *p, uint32_t *deepest)
+/* Where a polygon without width lies on a line, each part of it may be hidden on either side: what is not on the one is asked
+ * about on the other. */
+typedef struct detour {
+    uint32_t ref;
+    const struct detour *next;
+} detour;
+
+static umb_occlusion_answer filter(question *q, uint32_t ref, const polygon *p, const detour *other);
+
+static umb_occlusion_answer ask_cell(question *q, uint32_t ref, const polygon *p, const detour *other)
+{
+    umb_occlusion_answer answer = is_open(ref) ? UMB_OCCLUSION_OPEN : ask_cover(q, ref, p);
+    return answer != UMB_OCCLUSION_HIDDEN && other != NULL ? filter(q, other->ref, p, other->next) : answer;
+}
+
+/* Both parts, until one is not hidden. */
+static umb_occlusion_answer filter_parts(question *q, const umb_occlusion_node *n, const polygon *p, const int8_t *side,
+                                         const detour *other)
+{
+    if ((is_open(n->child[0]) || is_open(n->child[1])) && other == NULL) {
+        return UMB_OCCLUSION_OPEN;
+    }
+    umb_occlusion_answer answer = UMB_OCCLUSION_HIDDEN;
+    for (int k = 0; k < 2 && answer == UMB_OCCLUSION_HIDDEN; ++k) {
+        polygon part;
+        if (!cut(q->tree, p, n->line, side, k == 0 ? -1 : 1, q->top, &part)) {
+            return UMB_OCCLUSION_OPEN;
+        }
+        answer = filter(q, n->child[k], &part, other);
+    }
+    return answer;
+}
+
+static umb_occlusion_answer filter(question *q, uint32_t ref, const polygon *p, const detour *other)
 {
     while (!is_leaf(ref)) {
         const umb_occlusion_node *n = &q->tree->nodes[ref];
         int8_t side[MOST_CORNERS];
-        if (deepest != NULL) {
-            *deepest = ref;
-            int all = q->whole ? side_of_bounds(q, n->line) : 0;
-            if (all != 0) {
-                ref = n->child[all > 0];
-                continue;
-            }
-        }
         sides s = find_sides(q->tree, p, n->line, side);
         if (s.unknown) {
             return UMB_OCCLUSION_OPEN;
         }
         if (s.negative && s.positive) {
-            if (is_open(n->child[0]) || is_open(n->child[1])) {
-                return UMB_OCCLUSION_OPEN;
-            }
-            for (int k = 0; k < 2; ++k) {
-                polygon part;
-                if (!cut(q->tree, p, n->line, side, k == 0 ? -1 : 1, q->top, &part)) {
-                    return UMB_OCCLUSION_OPEN;
-                }
-                umb_occlusion_answer answer = filter(q, n->child[k], &part, NULL);
-                if (answer != UMB_OCCLUSION_HIDDEN) {
-                    return answer;
-                }
-            }
-            return UMB_OCCLUSION_HIDDEN;
+            return filter_parts(q, n, p, side, other);
         }
-        if (!s.negative && !s.positive) { /* all of it lies on the line, which belongs to both cells */
-            umb_occlusion_answer one = filter(q, n->child[0], p, NULL);
-            return one == UMB_OCCLUSION_HIDDEN ? one : filter(q, n->child[1], p, NULL);
+        if (!s.negative && !s.positive && q->detours > 0) {
+            detour positive = {n->child[1], other};
+            q->detours -= 1;
+            return filter(q, n->child[0], p, &positive);
         }
         ref = n->child[s.positive];
     }
-    if (deepest != NULL) {
-        *deepest = ref;
+    return ask_cell(q, ref, p, other);
+}
+
+/* The deepest node that all of the hull comes down to; for most of the way its bounds tell the side. */
+static uint32_t descend(const question *q, uint32_t ref, const polygon *p)
+{
+    while (!is_leaf(ref)) {
+        const umb_occlusion_node *n = &q->tree->nodes[ref];
+        int all = q->tree->shadows->viewer.sight.parallel ? 0 : side_of_bounds(q, n->line);
+        if (all == 0) {
+            int8_t side[MOST_CORNERS];
+            sides s = find_sides(q->tree, p, n->line, side);
+            if (s.unknown || s.negative == s.positive) {
+                return ref;
+            }
+            all = s.positive ? 1 : -1;
+        }
+        ref = n->child[all > 0];
     }
-    return is_open(ref) ? UMB_OCCLUSION_OPEN : ask_cover(q, ref, p);
+    return ref;
 }
 
 umb_occlusion_answer umb_occlusion_tree_ask(const umb_occlusion_tree *t, umb_hull *hull, uint32_t *start)
@@ -462,13 +490,13 @@ umb_occlusion_answer umb_occlusion_tree_ask(const umb_occlusion_tree *t, umb_hul
     q.hull = hull;
     q.first_face = 0;
     q.end_face = hull->face_count;
-    q.whole = !t->shadows->viewer.sight.parallel;
+    q.detours = MOST_DETOURS;
     q.top = room + ROOM;
     memset(q.beyond, 0, t->shadows->count < UMB_OCCLUSION_TREE_SHADOWS ? t->shadows->count : UMB_OCCLUSION_TREE_SHADOWS);
     polygon p = {room, hull->count};
     memcpy(room, hull->corners, hull->count * sizeof *room);
-    uint32_t from = *start;
-    umb_occlusion_answer answer = filter(&q, from, &p, start);
+    *start = descend(&q, *start, &p);
+    umb_occlusion_answer answer = filter(&q, *start, &p, NULL);
     if (answer != UMB_OCCLUSION_BEFORE || hull->face_count < 2) {
         return answer;
     }
@@ -477,7 +505,8 @@ umb_occlusion_answer umb_occlusion_tree_ask(const umb_occlusion_tree *t, umb_hul
         q.first_face = f;
         q.end_face = f + 1;
         p.count = umb_hull_face_polygon(hull, &t->shadows->viewer, f, lines, room);
-        umb_occlusion_answer face = filter(&q, from, &p, NULL);
+        q.detours = MOST_DETOURS;
+        umb_occlusion_answer face = filter(&q, *start, &p, NULL);
         if (face != UMB_OCCLUSION_HIDDEN) {
             return face;
         }
