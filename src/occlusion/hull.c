@@ -128,13 +128,15 @@ bool umb_hull_of_box(umb_hull *h, const umb_shadow_viewer *v, const umb_aabb *bo
 /* True if every point lies inside of every edge: then the polygon holds the image of their hull. */
 static bool holds_points(const umb_hull *h, const umb_shadow_viewer *v)
 {
+    umb_seen_corner corners[UMB_HULL_POINTS];
+    for (uint32_t k = 0; k < h->point_count; ++k) {
+        umb_seen_corner_at(&v->sight, h->points[k], &corners[k]);
+    }
     for (uint32_t i = 0; i < h->count; ++i) {
         umb_seen_line line;
         umb_seen_line_through(&v->sight, h->lines[i].a, h->lines[i].b, &line);
         for (uint32_t k = 0; k < h->point_count; ++k) {
-            umb_seen_corner c;
-            umb_seen_corner_at(&v->sight, h->points[k], &c);
-            int side = umb_seen_side(&v->sight, &line, &c);
+            int side = umb_seen_side(&v->sight, &line, &corners[k]);
             if (side != 0 && side != 1) {
                 return false;
             }

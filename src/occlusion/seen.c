@@ -54,6 +54,17 @@ static void cross(const umb_seen_vector *a, const umb_seen_vector *b, umb_seen_v
     }
 }
 
+static umb_seen_size size_of(const umb_seen_vector *v)
+{
+    umb_seen_size s = {fabs(v->at[0]), v->off[0]};
+    for (int k = 1; k < 3; ++k) {
+        double at = fabs(v->at[k]);
+        s.most = at > s.most ? at : s.most;
+        s.off = v->off[k] > s.off ? v->off[k] : s.off;
+    }
+    return s;
+}
+
 /* The image of a difference whose components have relative errors of one unit; without the last component of parallel
  * images. */
 static void image_of_difference(const umb_seen_from *s, const double d[3], umb_seen_vector *out)
@@ -93,6 +104,7 @@ static void make_ready(const umb_seen_from *s, umb_seen_line *line)
     umb_seen_image(s, a, &q);
     image_of_difference(s, d, &step);
     cross(&q, &step, &line->n);
+    line->size = size_of(&line->n);
     line->ready = true;
 }
 
@@ -119,12 +131,14 @@ void umb_seen_line_free(const double n[3], umb_seen_line *out)
         out->n.off[k] = 0.0;
         out->a[k] = out->b[k] = 0.0f;
     }
+    out->size = size_of(&out->n);
     out->free = out->ready = true;
 }
 
 void umb_seen_corner_at(const umb_seen_from *s, const float p[3], umb_seen_corner *out)
 {
     umb_seen_image(s, p, &out->v);
+    out->size = size_of(&out->v);
     memcpy(out->point, p, sizeof out->point);
     out->first = out->second = NULL;
     out->sign = 1;
@@ -139,6 +153,7 @@ void umb_seen_corner_of(const umb_seen_line *first, const umb_seen_line *second,
             out->v.at[k] = -out->v.at[k];
         }
     }
+    out->size = size_of(&out->v);
     out->first = first;
     out->second = second;
     out->sign = (int8_t)sign;
@@ -274,7 +289,9 @@ static bool surely_on(const umb_seen_line *line, const umb_seen_corner *c)
            (ends_at(c->first, line->b) && ends_at(c->second, line->b));
 }
 
-int umb_seen_side(const umb_seen_from *s, const umb_seen_line *line, const umb_seen_corner *corner)
+/* By a bound that knows each component, then by what is exact. */
+static __attribute__((noinline)) int close_side(const umb_seen_from *s, const umb_seen_line *line,
+                                                const umb_seen_corner *corner)
 {
     const umb_seen_vector *n = &line->n, *v = &corner->v;
     double sum = 0.0, size = 0.0, off = 0.0;
@@ -288,6 +305,18 @@ int umb_seen_side(const umb_seen_from *s, const umb_seen_line *line, const umb_s
         return sum > 0.0 ? 1 : -1;
     }
     return surely_on(line, corner) ? 0 : umb_seen_side_exact(s, line, corner);
+}
+
+int umb_seen_side(const umb_seen_from *s, const umb_seen_line *line, const umb_seen_corner *corner)
+{
+    const double *n = line->n.at, *v = corner->v.at;
+    const umb_seen_size *a = &line->size, *b = &corner->size;
+    double sum = n[0] * v[0] + n[1] * v[1] + n[2] * v[2];
+    double bound = 3.0 * (a->most * (b->off + 4.0 * U * b->most) + a->off * (b->most + b->off));
+    if (fabs(sum) > bound * PAD + LEAST) {
+        return sum > 0.0 ? 1 : -1;
+    }
+    return close_side(s, line, corner);
 }
 
 /* ---- cutting -------------------------------------------------------------------------------------- */

@@ -35,8 +35,14 @@ typedef struct umb_seen_vector {
     double at[3], off[3];
 } umb_seen_vector;
 
+/* The greatest of both over the components: a bound that is quick to find. */
+typedef struct umb_seen_size {
+    double most, off;
+} umb_seen_size;
+
 typedef struct umb_seen_line {
     umb_seen_vector n;
+    umb_seen_size size; /* of n */
     float a[3], b[3]; /* n is image(a) x image(b) */
     bool free;        /* it is made of no points: n is exact */
     bool ready;       /* n is known; cutting finds it when it wants it */
@@ -46,6 +52,7 @@ typedef struct umb_seen_line {
  * positive side of every edge: counter-clockwise with forward pointing at the reader. */
 typedef struct umb_seen_corner {
     umb_seen_vector v;
+    umb_seen_size size; /* of v */
     const umb_seen_line *first, *second; /* v = sign first x second; NULL: the image of a point */
     umb_seen_line *edge;
     float point[3];

@@ -15,7 +15,7 @@
 
 #define CHOSEN 64
 /* Candidates for each occluder that is chosen. */
-#define CANDIDATES 3
+#define CANDIDATES 2
 /* Lists of the nodes that wait: as deep as trees are, eight boxes each. */
 #define LEVELS 48
 #define MOST_SPACES (UMB_BLOCKER_EDGES + 2 * UMB_BLOCKER_PLANES)

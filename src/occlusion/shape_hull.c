@@ -22,6 +22,30 @@ static bool ask(const umb_shape_question *q, umb_hull *hull)
     return q->hidden(q->data, hull);
 }
 
+static bool is_seen(const umb_shape_question *q, const float p[3])
+{
+    if (q->open_at == NULL) {
+        return false;
+    }
+    double off, w = umb_shadow_depth(q->viewer, p, &off);
+    return w > q->viewer->near_depth && q->open_at(q->data, p);
+}
+
+/* A box whose middle is seen is not hidden: that is quicker to find than the whole of it. */
+static bool middle_shows(const umb_shape_question *q, const umb_aabb *box)
+{
+    const umb_object *o = q->object;
+    float middle[3], world[3];
+    for (int k = 0; k < 3; ++k) {
+        middle[k] = (float)(0.5 * ((double)box->min[k] + box->max[k]));
+        world[k] = middle[k];
+    }
+    if (!o->identity) {
+        umb_transform_point(&o->transform, middle, world);
+    }
+    return is_seen(q, world);
+}
+
 static bool box_hidden(const umb_shape_question *q, uint32_t part)
 {
     const umb_object *o = q->object;
@@ -30,6 +54,9 @@ static bool box_hidden(const umb_shape_question *q, uint32_t part)
     bool ready;
     if (o->identity && part == 0) {
         return false; /* the object's bounds */
+    }
+    if (middle_shows(q, box)) {
+        return false;
     }
     if (o->identity) {
         ready = q->points_only ? umb_hull_points_of_box(&hull, q->viewer, box) : umb_hull_of_box(&hull, q->viewer, box);
@@ -79,14 +106,13 @@ static bool leaf_hidden(const umb_shape_question *q, const umb_part *part)
 /* True if the middle of a triangle is seen: most visible things are found by this alone. */
 static bool leaf_middle_shows(const umb_shape_question *q, const umb_part *part)
 {
-    for (uint32_t i = part->begin; i < part->end && q->open_at != NULL; ++i) {
+    for (uint32_t i = part->begin; i < part->end; ++i) {
         float world[3][3], middle[3];
         place_triangle(q->object, q->object->mesh->part_order[i], world);
         for (int k = 0; k < 3; ++k) {
             middle[k] = (float)(((double)world[0][k] + world[1][k] + world[2][k]) * (1.0 / 3.0));
         }
-        double off, w = umb_shadow_depth(q->viewer, middle, &off);
-        if (w > q->viewer->near_depth && q->open_at(q->data, middle)) {
+        if (is_seen(q, middle)) {
             return true;
         }
     }
