@@ -19,20 +19,19 @@ typedef struct scene_row {
 static const scene_row ROWS[] = {
     {"blocks", "blocks-316", "gen:blocks,g=316", 0.0, true, 3200, 0, 0, 0, 0, 0},
     {"blocks", "blocks-100", "gen:blocks,g=100", 0.0, true, 800, 300, 0, 0, 0, 0},
-    {"blocks", "blocks-32", "gen:blocks,g=32", 0.0, true, 800, 500, 24, 0, 48, 0},
+    {"blocks", "blocks-32", "gen:blocks,g=32", 0.0, true, 800, 500, 24, 0, 16, 0},
     {"blocks", "blocks-32-moved", "gen:blocks,g=32", 50.0, true, 160, 300, 0, 0, 0, 0},
-    {"boxfield", "boxfield-20M", "gen:boxfield,polygons=20M", 0.0, true, 1600, 0, 0, 0, 16, 0},
-    {"boxfield", "boxfield-200k", "gen:boxfield,polygons=200k", 0.0, true, 800, 500, 0, 0, 160, 0},
-    {"boxfield", "boxfield-200k-moved", "gen:boxfield,polygons=200k", 50.0, true, 160, 300, 0, 0,
-     32, 0},
-    {"city", "city-20M", "gen:city,triangles=20M", 0.0, true, 1600, 0, 0, 0, 16, 0},
-    {"city", "city-1M", "gen:city,triangles=1M", 0.0, true, 800, 600, 0, 0, 160, 0},
-    {"city", "city-200k-moved", "gen:city,triangles=200k", 50.0, true, 160, 300, 0, 0, 48, 0},
-    {"building", "building-40", "gen:building,floors=40", 0.0, true, 800, 500, 0, 0, 96, 0},
-    {"building", "building-1-moved", "gen:building,floors=1", 50.0, true, 160, 300, 0, 16, 64, 16},
+    {"boxfield", "boxfield-20M", "gen:boxfield,polygons=20M", 0.0, true, 1600, 0, 0, 0, 4, 0},
+    {"boxfield", "boxfield-200k", "gen:boxfield,polygons=200k", 0.0, true, 800, 500, 0, 0, 48, 0},
+    {"boxfield", "boxfield-200k-moved", "gen:boxfield,polygons=200k", 50.0, true, 160, 300, 0, 0, 16, 0},
+    {"city", "city-20M", "gen:city,triangles=20M", 0.0, true, 1600, 0, 0, 0, 4, 0},
+    {"city", "city-1M", "gen:city,triangles=1M", 0.0, true, 800, 600, 0, 0, 48, 0},
+    {"city", "city-200k-moved", "gen:city,triangles=200k", 50.0, true, 160, 300, 0, 0, 16, 0},
+    {"building", "building-40", "gen:building,floors=40", 0.0, true, 800, 500, 0, 0, 32, 0},
+    {"building", "building-1-moved", "gen:building,floors=1", 50.0, true, 160, 300, 0, 16, 16, 16},
     {"medley", "medley-1M", "medley:1000000", 0.0, true, 1200, 0, 0, 0, 0, 0},
-    {"medley", "medley-20k", "medley:20000", 0.0, false, 800, 600, 0, 0, 64, 0},
-    {"medley", "medley-2k", "medley:2000", 0.0, true, 400, 500, 16, 16, 64, 16},
+    {"medley", "medley-20k", "medley:20000", 0.0, false, 800, 600, 0, 0, 16, 0},
+    {"medley", "medley-2k", "medley:2000", 0.0, true, 400, 500, 16, 16, 16, 16},
     {"medley", "medley-2k-moved", "medley:2000", 5000.0, true, 160, 300, 0, 0, 0, 0},
 };
 enum { ROW_COUNT = sizeof ROWS / sizeof ROWS[0] };
@@ -41,13 +40,13 @@ enum { ROW_COUNT = sizeof ROWS / sizeof ROWS[0] };
 enum {
     REAL_ORDINARY = 160,
     REAL_ADVERSARIAL = 320,
-    REAL_CELLS = 32,
+    REAL_CELLS = 8,
     MICRO_VIEWS = 6000,
     SHORT_MICRO = 48
 };
 
 /* Rays of a cell, and of one of a micro scene. */
-enum { CELL_RAYS = 1000000, SHORT_CELL_RAYS = 30000, MICRO_CELL_RAYS = 20000 };
+enum { CELL_RAYS = 4000000, SHORT_CELL_RAYS = 30000, MICRO_CELL_RAYS = 20000 };
 
 static uint32_t rays_of(soak_style style, bool full)
 {
