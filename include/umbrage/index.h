@@ -61,10 +61,35 @@ enum {
     UMB_INDEX_NODES = 1u << 1  /* what lies in a plane stays with the node, between its halves; else it is below */
 };
 
+/* How the index follows what moves, comes and goes (Gummerus 3.8). What the frustum holds is found with every one of
+ * them, exactly; they differ in what a commit costs and how good the index stays. FLAT has one way: lists are refitted,
+ * and written anew when anything comes or goes. In all other indices what comes is inserted and what goes is taken out
+ * at the cost of a way through the tree; subtrees that have seen many of both are built anew. */
+typedef enum umb_index_update {
+    UMB_UPDATE_DEFAULT = 0,       /* BVH: INCREMENTAL; others: REFIT */
+    UMB_UPDATE_REFIT = 1,         /* boxes follow what moves, nothing else changes: cheapest, good for motion in place */
+    UMB_UPDATE_DELETE_INSERT = 2, /* what moves is taken out and inserted from the top */
+    UMB_UPDATE_LCA = 3, /* the same below the least common ancestor of the old and new place only (Sudarsky 1998) */
+    /* What moves goes up to the first node that holds it, and down again when a culler has opened that node: at the
+       commit after, so that cullers may share the index (Aila and Miettinen 2001) */
+    UMB_UPDATE_LAZY = 4,
+    /* Inserted at the deepest node that holds it, from the top; full nodes are split by planes through the weighted
+       mean of what they hold (Shagam and Pfeiffer 2003) */
+    UMB_UPDATE_DEEPEST = 5,
+    /* Refitted; and when boxes have grown by a seventh the tree is built anew beside the one in use, by a
+       twenty-fourth each commit, and takes its place. Other kinds than BVH: built anew at once when boxes have doubled,
+       which allocates */
+    UMB_UPDATE_INCREMENTAL = 6,
+    /* GRID only, which is then one of overlapping voxels, scaled to unit cubes: an object belongs to the voxel of its box's
+       minimum corner alone, and one that moves within it changes nothing else (Tai and Hsu 3.1) */
+    UMB_UPDATE_OVERLAPPING = 7
+} umb_index_update;
+
 typedef struct umb_index_def {
     umb_index_kind kind;
     umb_index_rule rule;
     uint32_t options; /* UMB_INDEX_... bits */
+    umb_index_update update;
     umb_tasks tasks; /* for building; the result does not depend on it */
 } umb_index_def;
 
@@ -78,7 +103,8 @@ typedef struct umb_index_stats {
 } umb_index_stats;
 
 /* Build an index over the scene as last committed. The scene must outlive it; later commits update
- * it: moved boxes are refitted, additions and removals rebuild it. */
+ * it, as def->update says; a commit that finds no memory for it leaves it behind (UMB_ERROR_MEMORY from the commit,
+ * UMB_ERROR_STATE from its cullers), and the next one catches up. */
 UMB_API umb_result umb_index_create(umb_scene *scene, const umb_index_def *def, umb_index **out);
 /* NULL is allowed. Its cullers must be destroyed first. */
 UMB_API void umb_index_destroy(umb_index *index);
@@ -91,6 +117,12 @@ UMB_API const char *umb_index_kind_name(umb_index_kind kind);
 UMB_API bool umb_index_parse(const char *text, umb_index_def *out);
 /* The name that umb_index_parse() reads, with as few words as it takes; "unknown" if there is no such index. */
 UMB_API const char *umb_index_name(const umb_index_def *def);
+/* "default", "refit", "delete-insert", "lca", "lazy", "deepest", "incremental", "overlapping"; NULL if there is no such way. */
+UMB_API const char *umb_index_update_name(umb_index_update update);
+/* The way of that name; false if there is none, and *out is left alone. */
+UMB_API bool umb_index_update_parse(const char *text, umb_index_update *out);
+/* True if an index of this kind can follow its scene this way. */
+UMB_API bool umb_index_can_update(const umb_index_def *def);
 /* All the ways to build an index: the k-th name, NULL beyond the last. */
 UMB_API const char *umb_index_variant(uint32_t k);
 

@@ -6,7 +6,7 @@
 
 bool umb_chosen_reserve(umb_chosen_room *room, const umb_allocator *a, const umb_tree *tree)
 {
-    size_t most = (size_t)tree->node_count + tree->block_count;
+    size_t most = (size_t)tree->node_room + tree->block_count;
     return umb_memory_reserve(a, (void **)&room->nodes, &room->capacity, most, sizeof *room->nodes);
 }
 

@@ -171,7 +171,8 @@ static bool reserve(umb_culler *c, const umb_view *view, const umb_tree *tree, c
     size_t planes = c->plane_capacity;
     uint32_t width, height;
     umb_raster_map_size(view, &width, &height);
-    size_t waiting = (size_t)tree->item_count + tree->node_count + scene->motion.number_count, early = scene->occluder_count;
+    size_t waiting = (size_t)tree->item_count + tree->node_room + scene->motion.number_count;
+    size_t early = scene->occluder_count;
     if (!umb_memory_reserve(a, (void **)&c->rows, &c->row_capacity, umb_raster_map_table(height),
                             sizeof *c->rows) ||
         (tree->several && !umb_once_begin(&c->once, a, scene)) ||
@@ -389,6 +390,7 @@ static void open_node(walk *w, uint32_t number, uint16_t planes)
                  .number = number,
                  .planes = planes,
                  .remember = &w->culler->planes[number]};
+    umb_tree_note_open(w->tree, number);
     w->stats.nodes += 1;
     open_boxes(w, &o);
 }

@@ -12,7 +12,7 @@
 
 bool umb_in_view_reserve(umb_in_view_room *room, const umb_allocator *a, const umb_tree *tree)
 {
-    size_t most = (size_t)tree->node_count + tree->block_count;
+    size_t most = (size_t)tree->node_room + tree->block_count;
     return umb_memory_reserve(a, (void **)&room->nodes, &room->node_capacity, most, sizeof *room->nodes);
 }
 
@@ -24,7 +24,7 @@ void umb_in_view_free(umb_in_view_room *room, const umb_allocator *a)
 
 size_t umb_in_view_remembers(const umb_tree *tree)
 {
-    return (size_t)tree->node_count + tree->block_count;
+    return (size_t)tree->node_room + tree->block_count;
 }
 
 /* Inline: GCC finds that the function has no effect, and drops calls to it. */
@@ -93,7 +93,7 @@ static void open_node(umb_in_view *v, const umb_node *node, uint16_t planes, uin
     for (; in != 0; in &= in - 1) {
         uint32_t slot = (uint32_t)__builtin_ctz(in), ref = node->ref[slot], number = ref & UMB_REF_NUMBER;
         uint32_t kind = ref & UMB_REF_KIND;
-        if (kind == UMB_REF_NODE && whole && left[slot] == 0) {
+        if (kind == UMB_REF_NODE && whole && left[slot] == 0 && v->tree->below[number].count != UMB_RANGE_STALE) {
             copy_range(v, number);
         } else if (parts && kind == UMB_REF_OBJECT) {
             sizes ? find_part_of_size(v, number) : find_part(v, number);
@@ -130,6 +130,7 @@ void umb_in_view_find(umb_in_view *v)
             fetch(tree, nodes[i + AHEAD].number);
         }
         uint32_t number = nodes[i].number;
+        umb_tree_note_open(tree, number);
         open_node(v, umb_tree_node(tree, number), nodes[i].planes, &v->remember[number], &waiting);
     }
 }

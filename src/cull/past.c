@@ -9,7 +9,7 @@
 static bool reserve(umb_past *p, const umb_allocator *a, const umb_tree *tree, const umb_committed *scene)
 {
     bool list = umb_past_has(p, UMB_COHERENCE_LIST);
-    size_t nodes = umb_past_has(p, UMB_COHERENCE_HIERARCHY) ? tree->node_count : 0;
+    size_t nodes = umb_past_has(p, UMB_COHERENCE_HIERARCHY) ? tree->node_room : 0;
     size_t objects = umb_past_has(p, UMB_COHERENCE_CONSERVATIVE) ? scene->object_count : 0;
     size_t occluders = scene->occluder_count;
     return umb_memory_reserve(a, (void **)&p->open, &p->open_capacity, nodes, sizeof *p->open) &&

@@ -155,6 +155,14 @@ static void open_node(opened *o, const umb_bvh_split *splits, uint32_t node)
     gather_halves(o, splits, node, left, UMB_NODE_WIDTH - left);
 }
 
+uint32_t umb_bvh_open(const umb_bvh_split *splits, uint32_t node, uint32_t slots[UMB_NODE_WIDTH])
+{
+    opened o = {.count = 0};
+    open_node(&o, splits, node);
+    memcpy(slots, o.slots, o.count * sizeof(slots[0]));
+    return o.count;
+}
+
 static uint32_t count_nodes(const umb_bvh_split *splits, uint32_t node, uint32_t *slots)
 {
     opened o = {.count = 0};
@@ -363,6 +371,31 @@ umb_result umb_bvh_marks_create(umb_bvh_marks *marks, const umb_allocator *a, ui
     return UMB_OK;
 }
 
+bool umb_bvh_marks_reserve(umb_bvh_marks *marks, const umb_allocator *a, uint32_t node_count)
+{
+    if (marks->nodes != NULL && (size_t)node_count / 64 + 1 <= marks->node_words) {
+        return true;
+    }
+    umb_bvh_marks more;
+    if (umb_bvh_marks_create(&more, a, node_count) != UMB_OK) {
+        return false;
+    }
+    if (marks->nodes != NULL) {
+        memcpy(more.nodes, marks->nodes, marks->node_words * sizeof(more.nodes[0]));
+        memcpy(more.words, marks->words, marks->word_words * sizeof(more.words[0]));
+    }
+    umb_bvh_marks_free(marks, a);
+    *marks = more;
+    return true;
+}
+
+void umb_bvh_marks_clear(umb_bvh_marks *marks)
+{
+    if (marks->nodes != NULL) {
+        memset(marks->nodes, 0, umb_bvh_marks_memory(marks));
+    }
+}
+
 size_t umb_bvh_marks_memory(const umb_bvh_marks *marks)
 {
     return (marks->node_words + marks->word_words) * sizeof(marks->nodes[0]);
@@ -412,7 +445,7 @@ static inline void lift(umb_node *nodes, const umb_bvh_marks *marks, uint32_t nu
 }
 
 /* A node marks none but its parent, whose number is lower: a word that is left is done with. */
-static void lift_all(umb_node *nodes, const umb_bvh_marks *marks)
+void umb_bvh_lift_marked(umb_node *nodes, const umb_bvh_marks *marks)
 {
     for (size_t w = marks->word_words; w-- > 0;) {
         while (marks->words[w] != 0) {
@@ -451,5 +484,5 @@ void umb_bvh_refit_moved(umb_node *nodes, umb_bvh_marks *marks, const uint32_t *
             umb_bvh_mark(marks, place / UMB_NODE_WIDTH);
         }
     }
-    lift_all(nodes, marks);
+    umb_bvh_lift_marked(nodes, marks);
 }

@@ -54,6 +54,11 @@ typedef struct umb_bvh_marks {
 umb_result umb_bvh_marks_create(umb_bvh_marks *marks, const umb_allocator *a, uint32_t node_count);
 void umb_bvh_marks_free(umb_bvh_marks *marks, const umb_allocator *a);
 size_t umb_bvh_marks_memory(const umb_bvh_marks *marks);
+/* Room for more nodes; marks are kept. False without memory. */
+bool umb_bvh_marks_reserve(umb_bvh_marks *marks, const umb_allocator *a, uint32_t node_count);
+void umb_bvh_marks_clear(umb_bvh_marks *marks);
+/* Bring the boxes of marked nodes up to their parents, as far as they change. */
+void umb_bvh_lift_marked(umb_node *nodes, const umb_bvh_marks *marks);
 
 static inline void umb_bvh_mark(const umb_bvh_marks *marks, uint32_t node)
 {
@@ -96,5 +101,28 @@ struct umb_cell_point;
 umb_result umb_bvh_lay_out(const umb_allocator *a, const umb_bvh_item *items, const umb_bvh_split *splits,
                            uint32_t root, const struct umb_cell_cut *cuts, const struct umb_cell_point *points,
                            umb_built *out);
+
+/* The slots of the wide node at the root of a binary subtree that has its picks. Returns how many. */
+uint32_t umb_bvh_open(const umb_bvh_split *splits, uint32_t node, uint32_t slots[UMB_NODE_WIDTH]);
+
+/* Split items as umb_bvh_split_items() does, without memory and tasks. Returns the root. */
+uint32_t umb_bvh_split_at_once(umb_bvh_item *items, uint32_t count, umb_bvh_split *splits);
+
+/* The same in steps, which may be far apart. */
+typedef struct umb_bvh_steps umb_bvh_steps;
+
+umb_bvh_steps *umb_bvh_steps_create(const umb_allocator *a);
+void umb_bvh_steps_destroy(umb_bvh_steps *steps, const umb_allocator *a);
+size_t umb_bvh_steps_memory(const umb_bvh_steps *steps);
+/* Room for what is likely to be wanted for so many items. False without memory. */
+bool umb_bvh_steps_reserve(umb_bvh_steps *steps, const umb_allocator *a, uint32_t count);
+/* Items and splits stay the caller's and where they are. False without memory. */
+bool umb_bvh_steps_start(umb_bvh_steps *steps, const umb_allocator *a, umb_bvh_item *items, uint32_t count,
+                         umb_bvh_split *splits);
+/* One step, of a few thousand items, or all of them once. Returns what it cost: about the number of items looked at.
+ * 0: nothing is left to do; UMB_NONE: there is no memory. */
+uint32_t umb_bvh_steps_run(umb_bvh_steps *steps, const umb_allocator *a);
+/* When nothing is left to do: the root. */
+uint32_t umb_bvh_steps_finish(umb_bvh_steps *steps);
 
 #endif

@@ -370,3 +370,116 @@ uint32_t umb_bvh_split_run(umb_bvh_item *items, uint32_t first, uint32_t end, um
     split_plainly(&b, &all);
     return root;
 }
+
+/* ---- in steps ------------------------------------------------------------------------------- */
+
+static build begin(umb_bvh_item *items, uint32_t count, umb_bvh_split *splits, range *all)
+{
+    build b = {.items = items, .splits = splits};
+    all->box = empty_box;
+    for (uint32_t i = 0; i < count; ++i) {
+        box_grow(&all->box, items[i].min, items[i].max);
+    }
+    b.costs = umb_cut_costs_of(umb_half_area(all->box.min, all->box.max), count);
+    return b;
+}
+
+uint32_t umb_bvh_split_at_once(umb_bvh_item *items, uint32_t count, umb_bvh_split *splits)
+{
+    uint32_t root;
+    range all = {0, count, 0, &root, empty_box};
+    build b = begin(items, count, splits, &all);
+    split_all(&b, &all);
+    return root;
+}
+
+/* What one of TASK_ITEMS costs when all its levels are split, over once being looked at: most levels are in the
+ * caches. */
+#define TASK_COST 6
+
+struct umb_bvh_steps {
+    build build;
+    range *waiting; /* the leftmost last */
+    size_t capacity;
+    uint32_t waiting_count, count, root;
+};
+
+umb_bvh_steps *umb_bvh_steps_create(const umb_allocator *a)
+{
+    return umb_memory_allocate_zero(a, 1, sizeof(umb_bvh_steps));
+}
+
+void umb_bvh_steps_destroy(umb_bvh_steps *steps, const umb_allocator *a)
+{
+    if (steps != NULL) {
+        umb_memory_free(a, steps->waiting, steps->capacity * sizeof(steps->waiting[0]));
+        umb_memory_free(a, steps->build.tasks, steps->build.task_capacity * sizeof(steps->build.tasks[0]));
+        umb_memory_free(a, steps, sizeof(*steps));
+    }
+}
+
+size_t umb_bvh_steps_memory(const umb_bvh_steps *steps)
+{
+    return sizeof(*steps) + steps->capacity * sizeof(steps->waiting[0]) +
+           steps->build.task_capacity * sizeof(steps->build.tasks[0]);
+}
+
+bool umb_bvh_steps_reserve(umb_bvh_steps *steps, const umb_allocator *a, uint32_t count)
+{
+    build *b = &steps->build;
+    size_t tasks = count / (TASK_ITEMS / 8) + 8;
+    return umb_memory_reserve(a, (void **)&steps->waiting, &steps->capacity, tasks, sizeof(steps->waiting[0])) &&
+           umb_memory_reserve(a, (void **)&b->tasks, &b->task_capacity, tasks, sizeof(b->tasks[0]));
+}
+
+bool umb_bvh_steps_start(umb_bvh_steps *steps, const umb_allocator *a, umb_bvh_item *items, uint32_t count,
+                         umb_bvh_split *splits)
+{
+    if (!umb_memory_reserve(a, (void **)&steps->waiting, &steps->capacity, 1, sizeof(steps->waiting[0]))) {
+        return false;
+    }
+    struct task *tasks = steps->build.tasks;
+    size_t capacity = steps->build.task_capacity;
+    range all = {0, count, 0, &steps->root, empty_box};
+    steps->build = begin(items, count, splits, &all);
+    steps->build.tasks = tasks;
+    steps->build.task_capacity = capacity;
+    steps->count = count;
+    steps->waiting[0] = all;
+    steps->waiting_count = 1;
+    return true;
+}
+
+uint32_t umb_bvh_steps_run(umb_bvh_steps *steps, const umb_allocator *a)
+{
+    build *b = &steps->build;
+    if (steps->waiting_count == 0) {
+        return 0;
+    }
+    if (!umb_memory_reserve(a, (void **)&steps->waiting, &steps->capacity, (size_t)steps->waiting_count + 1,
+                            sizeof(steps->waiting[0])) ||
+        !umb_memory_reserve(a, (void **)&b->tasks, &b->task_capacity, (size_t)b->task_count + 1,
+                            sizeof(b->tasks[0]))) {
+        return UMB_NONE;
+    }
+    range r = steps->waiting[--steps->waiting_count];
+    uint32_t count = r.end - r.first;
+    if (count <= TASK_ITEMS) {
+        b->tasks[b->task_count].range = r;
+        run_task(b, b->task_count++);
+        return TASK_COST * count;
+    }
+    range halves[2];
+    split_node(b, &r, halves);
+    steps->waiting[steps->waiting_count++] = halves[1];
+    steps->waiting[steps->waiting_count++] = halves[0];
+    return count;
+}
+
+uint32_t umb_bvh_steps_finish(umb_bvh_steps *steps)
+{
+    uint32_t next = 0;
+    box4 box;
+    cut_top(&steps->build, steps->root, 0, steps->count, &next, &box);
+    return steps->root;
+}

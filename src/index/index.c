@@ -9,26 +9,28 @@
 #include "index_name.h"
 #include "kdtree.h"
 #include "octree.h"
-#include "parts.h"
+#include "rebuild_job.h"
+#include "update.h"
 
 struct umb_index {
     umb_tree tree;
-    umb_built built;  /* what tree.nodes, orders and planes point at */
-    uint32_t *places; /* of each object (umb_bvh_find_places) */
-    uint32_t *next;   /* places of objects that have several */
-    umb_bvh_marks marks;
-    uint32_t *objects; /* what tree.objects, below and blocks point at */
-    umb_range *below;
+    umb_tree_edit edit;    /* what tree.nodes and below point at */
+    umb_updater updater;
+    umb_rebuild_job job;
+    umb_order *orders;     /* of the tree as built */
+    umb_tilted_plane *planes;
+    uint32_t order_count, plane_count;
+    uint32_t *objects;     /* what tree.objects and blocks point at */
     umb_node *blocks;
+    size_t object_capacity, block_capacity;
     umb_scene *scene;
     umb_scene_listener listener;
     umb_allocator allocator;
     umb_index_def def;
-    /* The state of the scene that the structure was built from: refitting needs all four
-     * unchanged. */
-    uint64_t structure;
-    uint32_t object_count, first_free_occluder, occluder_count;
-    uint32_t item_count; /* objects and occluders in it, each once */
+    uint64_t structure;    /* of the scene that it shows */
+    uint32_t live_count;   /* objects in it, each once */
+    uint32_t item_count;   /* and occluders */
+    bool builds_beside;    /* incremental rebuilds are done by the job; else at once */
 };
 
 /* ---- items ---------------------------------------------------------------------------------- */
@@ -180,89 +182,127 @@ static umb_aabb bounds_of(const umb_tree *tree)
     return umb_node_bounds(tree->flat ? &tree->blocks[tree->block_count - 1] : &tree->nodes[0]);
 }
 
-/* What follows from the nodes' boxes. */
-static void settle(umb_index *index)
+/* Where readers find the arrays, which may have moved. */
+static void show(umb_index *index)
 {
-    fill_blocks(index);
-    index->tree.bounds = bounds_of(&index->tree);
-    index->tree.version = umb_scene_committed(index->scene)->version;
+    umb_tree *tree = &index->tree;
+    tree->nodes = index->edit.nodes;
+    tree->node_count = index->edit.node_count;
+    tree->node_room = (uint32_t)index->edit.room;
+    tree->item_count = index->edit.slot_count;
+    tree->below = index->edit.below;
+    tree->objects = index->objects;
+    tree->blocks = index->blocks;
+    tree->opened = index->updater.opened;
 }
 
-/* Bytes of what goes with the nodes. */
-typedef struct sizes {
-    size_t places, next, objects, below, blocks;
-} sizes;
-
-static sizes sizes_of(const umb_tree *tree, uint32_t object_count)
+/* What readers see, from the nodes. */
+static void settle(umb_index *index)
 {
-    return (sizes){.places = object_count * sizeof(uint32_t),
-                   .next = tree->several ? (size_t)tree->node_count * UMB_NODE_WIDTH * sizeof(uint32_t) : 0,
-                   .objects = ((size_t)tree->item_count + UMB_TREE_SPARE) * sizeof(uint32_t),
-                   .below = ((size_t)tree->node_count + tree->block_count) * sizeof(umb_range),
-                   .blocks = tree->block_count * sizeof(umb_node)};
+    const umb_committed *c = umb_scene_committed(index->scene);
+    umb_tree *tree = &index->tree;
+    show(index);
+    index->structure = c->structure;
+    index->item_count = index->live_count + (c->occluder_count - c->first_free_occluder);
+    fill_blocks(index);
+    tree->bounds = bounds_of(tree);
+    tree->version = c->version;
 }
 
 static void drop(umb_index *index)
 {
     const umb_allocator *a = &index->allocator;
-    sizes s = sizes_of(&index->tree, index->object_count);
-    umb_built_free(&index->built, a);
-    umb_memory_free(a, index->places, s.places);
-    umb_memory_free(a, index->next, s.next);
-    umb_memory_free(a, index->objects, s.objects);
-    umb_memory_free(a, index->below, s.below);
-    umb_memory_free(a, index->blocks, s.blocks);
-    umb_bvh_marks_free(&index->marks, a);
+    umb_rebuild_job_free(&index->job, a);
+    umb_update_free(&index->updater, a);
+    umb_tree_edit_free(&index->edit);
+    umb_memory_free(a, index->orders, index->order_count * sizeof(umb_order));
+    umb_memory_free(a, index->planes, index->plane_count * sizeof(umb_tilted_plane));
+    umb_memory_free(a, index->objects, index->object_capacity * sizeof(uint32_t));
+    umb_memory_free(a, index->blocks, index->block_capacity * sizeof(umb_node));
 }
 
-/* Memory for all that goes with a tree's nodes; the rest of *out is not looked at. */
-static bool furnish(umb_index *out, uint32_t object_count)
+/* The lists of what is below each node. There is room: there are never fewer slots for it than there were. */
+static void list_objects(umb_index *index)
 {
-    const umb_allocator *a = &out->allocator;
-    sizes s = sizes_of(&out->tree, object_count);
-    out->places = umb_memory_allocate(a, s.places);
-    out->next = s.next > 0 ? umb_memory_allocate(a, s.next) : NULL;
-    out->objects = umb_memory_allocate(a, s.objects);
-    out->below = umb_memory_allocate(a, s.below);
-    out->blocks = umb_memory_allocate_zero(a, s.blocks, 1);
-    out->marks = (umb_bvh_marks){0};
-    return out->places != NULL && (out->next != NULL || s.next == 0) && out->objects != NULL && out->below != NULL &&
-           out->blocks != NULL && umb_bvh_marks_create(&out->marks, a, out->tree.node_count) == UMB_OK;
+    umb_tree_edit *e = &index->edit;
+    index->tree.object_count = umb_bvh_list_objects(e->nodes, e->node_count, index->objects, e->below);
+    e->stale = 0;
 }
 
-/* Take over what was built over so many items, or free it when there is no memory to follow their objects. */
+/* Room beside the nodes for a tree with so many slots and blocks. */
+static bool furnish(umb_index *index, uint32_t node_count, uint32_t slot_count, uint32_t block_count)
+{
+    const umb_allocator *a = &index->allocator;
+    umb_tree_edit *e = &index->edit;
+    return umb_memory_reserve(a, (void **)&index->objects, &index->object_capacity,
+                              (size_t)slot_count + UMB_TREE_SPARE, sizeof(uint32_t)) &&
+           umb_memory_reserve(a, (void **)&index->blocks, &index->block_capacity, block_count, sizeof(umb_node)) &&
+           umb_memory_reserve(a, (void **)&e->below, &e->below_capacity, (size_t)node_count + block_count,
+                              sizeof(umb_range));
+}
+
+/* Take over what was built over the scene's items, or free it when there is no memory to follow them. */
 static umb_result adopt(umb_index *index, const umb_committed *c, umb_built *built, uint32_t item_count)
 {
-    umb_index next = *index;
-    umb_tree *tree = &next.tree;
-    next.built = *built;
-    tree->node_count = built->node_count;
-    tree->item_count = built->slot_count;
-    tree->several = built->slot_count > item_count;
-    tree->block_count = tree->flat ? count_blocks(built->node_count) : 0;
-    next.structure = c->structure;
-    next.object_count = c->object_count;
-    next.first_free_occluder = c->first_free_occluder;
-    next.occluder_count = c->occluder_count;
-    next.item_count = item_count;
-    if (!furnish(&next, c->object_count)) {
-        drop(&next);
+    const umb_allocator *a = &index->allocator;
+    umb_tree *tree = &index->tree;
+    umb_tree_edit *e = &index->edit;
+    umb_node *old = e->nodes;
+    size_t old_bytes = e->node_capacity * sizeof(umb_node);
+    bool several = built->slot_count > item_count;
+    uint32_t blocks = tree->flat ? count_blocks(built->node_count) : 0;
+    if (!furnish(index, built->node_count, built->slot_count, blocks) ||
+        !umb_tree_edit_adopt(e, built->nodes, built->node_count, built->node_count, several, c)) {
+        umb_built_free(built, a);
         return UMB_ERROR_MEMORY;
     }
-    drop(index);
-    umb_bvh_find_places(built->nodes, built->node_count, next.places, c->object_count, next.next);
-    tree->object_count = umb_bvh_list_objects(built->nodes, built->node_count, next.objects, next.below);
-    if (tree->flat) {
-        lay_blocks(next.blocks, next.below, built->node_count);
+    umb_memory_free(a, old, old_bytes);
+    umb_memory_free(a, index->orders, index->order_count * sizeof(umb_order));
+    umb_memory_free(a, index->planes, index->plane_count * sizeof(umb_tilted_plane));
+    tree->orders = index->orders = built->orders;
+    tree->planes = index->planes = built->planes;
+    index->order_count = built->orders != NULL ? built->node_count : 0;
+    index->plane_count = built->plane_count;
+    index->live_count = item_count - (c->occluder_count - c->first_free_occluder);
+    tree->several = several;
+    tree->block_count = blocks;
+    list_objects(index);
+    if (blocks > 0) {
+        memset(index->blocks, 0, blocks * sizeof(umb_node));
+        lay_blocks(index->blocks, e->below, built->node_count);
     }
-    tree->nodes = built->nodes;
-    tree->orders = built->orders;
-    tree->planes = built->planes;
-    tree->objects = next.objects;
-    tree->below = next.below;
-    tree->blocks = next.blocks;
-    *index = next;
+    umb_rebuild_job_drop(&index->job);
+    if (!umb_update_reserve(&index->updater, e)) {
+        e->failed = true;
+        return UMB_ERROR_MEMORY;
+    }
     return UMB_OK;
+}
+
+/* The grid of overlapping voxels is filled item by item. */
+static umb_result fill_voxels(umb_index *index, const umb_committed *c, uint32_t count)
+{
+    const umb_allocator *a = &index->allocator;
+    umb_built nothing = {.slot_count = 0};
+    umb_tree_edit *e = &index->edit;
+    umb_bvh_item *items = umb_memory_allocate(a, count * sizeof(items[0]));
+    umb_result result = items != NULL || count == 0 ? adopt(index, c, &nothing, 0) : UMB_ERROR_MEMORY;
+    if (result == UMB_OK && count > 0) {
+        gather_items(c, items);
+        index->updater.voxels = umb_voxels_choose(items, count);
+        umb_voxels_build(&index->updater.voxels, e, items, count);
+        umb_bvh_lift_marked(e->nodes, &e->marks);
+        umb_tree_edit_learn(e);
+        index->live_count = count - (c->occluder_count - c->first_free_occluder);
+        if (e->failed || !furnish(index, e->node_count, e->slot_count, 0)) {
+            e->failed = true;
+            result = UMB_ERROR_MEMORY;
+        } else {
+            list_objects(index);
+        }
+    }
+    umb_memory_free(a, items, count * sizeof(items[0]));
+    return result;
 }
 
 static umb_result rebuild(umb_index *index, const umb_committed *c)
@@ -274,6 +314,11 @@ static umb_result rebuild(umb_index *index, const umb_committed *c)
     uint32_t count = count_items(c);
     umb_built built = {0};
     umb_result result = UMB_OK;
+    if (index->updater.strategy == UMB_UPDATE_OVERLAPPING) {
+        result = fill_voxels(index, c, count);
+        return result == UMB_OK ? result
+                                : umb_scene_fail(index->scene, result, "no memory to index %u items", count);
+    }
     if (count > 0) {
         const umb_allocator *a = &index->allocator;
         umb_bvh_item *items = umb_memory_allocate(a, count * sizeof(items[0]));
@@ -293,11 +338,49 @@ static umb_result rebuild(umb_index *index, const umb_committed *c)
     return UMB_OK;
 }
 
-static bool only_moved(const umb_index *index, const umb_committed *c)
+/* True if the change lists tell all that happened since what the tree shows, and following them costs less than
+ * building. */
+static bool can_follow(const umb_index *index, const umb_committed *c)
 {
-    return index->structure == c->structure && index->object_count == c->object_count &&
-           index->first_free_occluder == c->first_free_occluder &&
-           index->occluder_count == c->occluder_count;
+    bool grew = index->structure != c->structure;
+    return !index->edit.failed && index->tree.version + 1 == c->version &&
+           (!grew || (index->structure + 1 == c->structure && !index->tree.flat)) &&
+           umb_update_is_small(&index->edit, c, grew);
+}
+
+/* A tree that has grown much worse than it was as built, and that nothing makes better meanwhile. */
+static bool is_worn_out(umb_index *index, const umb_committed *c, bool grew)
+{
+    return index->updater.strategy == UMB_UPDATE_INCREMENTAL && !index->tree.flat && !index->builds_beside &&
+           umb_rebuild_job_watch(&index->job, &index->edit, c, grew) > 2.0;
+}
+
+/* True if the tree has followed the scene. */
+static bool follow(umb_index *index, const umb_committed *c)
+{
+    umb_tree_edit *e = &index->edit;
+    bool grew = index->structure != c->structure;
+    if (c->moved_count > 0 || grew) {
+        index->tree.orders = NULL; /* what moved may be in other cells now */
+    }
+    if (!umb_update_follow(&index->updater, e, c, grew)) {
+        e->failed = true;
+        return false;
+    }
+    if (grew) {
+        index->live_count += c->came_count - c->went_count;
+    }
+    bool exchanged = index->builds_beside && umb_rebuild_job_step(&index->job, e, c, grew);
+    if (e->failed || is_worn_out(index, c, grew)) {
+        return false;
+    }
+    /* Lists made anew for every so many edits cost each of them the same. */
+    if ((exchanged || e->stale > e->slot_count / 4 + 64) && furnish(index, e->node_count, e->slot_count, 0)) {
+        list_objects(index);
+    } else if (e->stale > 0) {
+        index->tree.object_count = e->slot_count;
+    }
+    return true;
 }
 
 static umb_result update(void *user)
@@ -307,23 +390,11 @@ static umb_result update(void *user)
     if (index->tree.version == c->version) {
         return UMB_OK;
     }
-    /* One commit since the version shown: its list of moves is all of them. */
-    bool next = index->tree.version + 1 == c->version;
-    if (only_moved(index, c) && (next || !index->tree.several)) {
-        if (index->tree.orders != NULL && c->moved_count > 0) {
-            index->tree.orders = NULL; /* what moved may be in other cells now */
-        }
-        if (next && index->tree.several) {
-            umb_parts_gather_moved(index->built.nodes, index->places, index->next, &index->marks, c);
-        }
-        if (next) {
-            umb_bvh_refit_moved(index->built.nodes, &index->marks, index->places, c);
-        } else {
-            umb_bvh_refit(index->built.nodes, index->tree.node_count, c);
-        }
-    } else {
+    if (!can_follow(index, c) || !follow(index, c)) {
         umb_result result = rebuild(index, c);
         if (result != UMB_OK) {
+            index->edit.failed = true; /* half of the changes may be in it */
+            show(index);
             return result;
         }
     }
@@ -405,7 +476,8 @@ static bool restore_node(restorer *r, uint32_t k, const uint32_t refs[UMB_NODE_W
             return false;
         }
     }
-    return node->count > 0 && (r->flat || k == 0 || r->seen[k]);
+    bool named = r->flat || k == 0 || r->seen[k];
+    return node->count > 0 ? named : !named || (r->flat && k == 0); /* without slots: a number that is free */
 }
 
 /* Boxes of nodes from those of parts. */
@@ -471,6 +543,10 @@ static umb_result make_empty(umb_scene *scene, const umb_index_def *def, umb_ind
         return umb_scene_fail(scene, UMB_ERROR_ARGUMENT, "no index of kind %d with rule %d", (int)def->kind,
                               (int)def->rule);
     }
+    if (!umb_index_can_update(def)) {
+        return umb_scene_fail(scene, UMB_ERROR_ARGUMENT, "an index of this kind has no way %d to follow its scene",
+                              (int)def->update);
+    }
     const umb_allocator *a = umb_scene_allocator(scene);
     umb_index *index = umb_memory_allocate_zero(a, 1, sizeof(*index));
     if (index == NULL) {
@@ -480,6 +556,11 @@ static umb_result make_empty(umb_scene *scene, const umb_index_def *def, umb_ind
     index->allocator = *a;
     index->def = *def;
     index->tree.flat = def->kind == UMB_INDEX_FLAT;
+    index->edit.allocator = &index->allocator;
+    bool boxes = def->kind == UMB_INDEX_BVH && def->rule == UMB_RULE_DEFAULT;
+    umb_index_update usual = boxes ? UMB_UPDATE_INCREMENTAL : UMB_UPDATE_REFIT;
+    index->updater.strategy = def->update != UMB_UPDATE_DEFAULT ? def->update : usual;
+    index->builds_beside = index->updater.strategy == UMB_UPDATE_INCREMENTAL && boxes;
     *out = index;
     return UMB_OK;
 }
@@ -490,6 +571,7 @@ static umb_result start_following(umb_index *index, umb_result result, umb_index
 {
     if (result != UMB_OK) {
         umb_allocator a = index->allocator;
+        drop(index);
         umb_memory_free(&a, index, sizeof(*index));
         return result;
     }
@@ -569,12 +651,13 @@ void umb_index_get_stats(const umb_index *index, umb_index_stats *out)
     const umb_tree *tree = &index->tree;
     out->items = index->item_count;
     out->slots = tree->item_count;
-    out->nodes = tree->node_count;
+    out->nodes = tree->node_count - index->edit.free.count;
     out->depth = tree_depth(tree);
     out->cost = tree_cost(tree);
-    sizes s = sizes_of(tree, index->object_count);
-    out->bytes = sizeof(*index) + umb_built_memory(&index->built) + s.places + s.next + s.objects + s.below +
-                 s.blocks + umb_bvh_marks_memory(&index->marks);
+    out->bytes = sizeof(*index) + umb_tree_edit_memory(&index->edit) + umb_rebuild_job_memory(&index->job) +
+                 umb_update_memory(&index->updater) + index->order_count * sizeof(umb_order) +
+                 index->plane_count * sizeof(umb_tilted_plane) + index->object_capacity * sizeof(uint32_t) +
+                 index->block_capacity * sizeof(umb_node);
 }
 
 const umb_tree *umb_index_tree(const umb_index *index)

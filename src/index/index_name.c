@@ -115,3 +115,38 @@ const char *umb_index_kind_name(umb_index_kind kind)
     umb_index_def def = {.kind = kind};
     return umb_index_name(&def);
 }
+
+/* ---- ways to follow ------------------------------------------------------------------------- */
+
+static const char *const updates[] = {
+    [UMB_UPDATE_DEFAULT] = "default", [UMB_UPDATE_REFIT] = "refit", [UMB_UPDATE_DELETE_INSERT] = "delete-insert",
+    [UMB_UPDATE_LCA] = "lca",         [UMB_UPDATE_LAZY] = "lazy",   [UMB_UPDATE_DEEPEST] = "deepest",
+    [UMB_UPDATE_INCREMENTAL] = "incremental", [UMB_UPDATE_OVERLAPPING] = "overlapping",
+};
+
+#define UPDATES (sizeof(updates) / sizeof(updates[0]))
+
+const char *umb_index_update_name(umb_index_update update)
+{
+    return (size_t)update < UPDATES ? updates[update] : NULL;
+}
+
+bool umb_index_update_parse(const char *text, umb_index_update *out)
+{
+    for (size_t k = 0; k < UPDATES; ++k) {
+        if (strcmp(text, updates[k]) == 0) {
+            *out = (umb_index_update)k;
+            return true;
+        }
+    }
+    return false;
+}
+
+bool umb_index_can_update(const umb_index_def *def)
+{
+    bool plain = def->update == UMB_UPDATE_DEFAULT || def->update == UMB_UPDATE_REFIT;
+    if (def->update == UMB_UPDATE_OVERLAPPING) {
+        return def->kind == UMB_INDEX_GRID && def->rule == UMB_RULE_DEFAULT;
+    }
+    return plain || (def->kind != UMB_INDEX_FLAT && umb_index_update_name(def->update) != NULL);
+}

@@ -24,7 +24,11 @@ typedef struct umb_node {
     uint32_t count;
     uint32_t parent; /* node number, UMB_NONE for the root */
     uint32_t slot;   /* of this node in its parent; 0 for the root */
-    uint32_t pad[5];
+    uint32_t items;  /* slots that name items, here and below; this and what follows are tree_edit.h's */
+    uint32_t edits;  /* items that came or went since it was built */
+    float built;     /* half the surface of its box then */
+    uint32_t cell;   /* of a grid, that this node is (voxels.h); 0: none */
+    uint32_t pad;
 } umb_node;
 
 /* How the slots of a node come front to back from an eye, exactly (walk.h). Only trees whose cells are disjoint have
@@ -73,12 +77,18 @@ typedef struct umb_range {
     uint32_t first, count;
 } umb_range;
 
+/* The count of a range that is none: objects below the node have to be looked for. */
+#define UMB_RANGE_STALE UINT32_MAX
+
 /* So many entries behind the list of objects may be read, too. */
 #define UMB_TREE_SPARE 8
 
 typedef struct umb_tree {
-    const umb_node *nodes; /* parents before children; the root is node 0 */
-    uint32_t node_count;   /* 0: the index is empty */
+    /* Parents have lower numbers than their children; the root is node 0. Numbers that are free have nodes without
+     * slots, which no other names. */
+    const umb_node *nodes;
+    uint32_t node_count;   /* of numbers in use or free; 0: the index is empty */
+    uint32_t node_room;    /* at least as many, and the same for as long as the index finds room in its memory */
     uint32_t item_count;   /* slots that name items; as many as there are items unless several is set */
     /* An item may be in several slots, each with the box of a part of it; the parts together hold all of it. Walks
      * then answer an object once, and only a whole object has a depth, a size, or lies inside something. An object of
@@ -96,6 +106,8 @@ typedef struct umb_tree {
      * They follow the order of the list, whatever that is. Block k has the number node_count + k, in refs and below. */
     const umb_node *blocks;
     uint32_t block_count; /* the last one holds all */
+    /* Where walks note the nodes that they open, a bit each; NULL: nobody wants to know (UMB_UPDATE_LAZY). */
+    uint64_t *opened;
     umb_aabb bounds;       /* of all items; zero when empty */
     uint64_t version;      /* of the commit it shows. Behind the scene's only after an update that found no
                               memory: answers would then be wrong, so readers refuse (UMB_ERROR_STATE) */
@@ -105,6 +117,17 @@ typedef struct umb_tree {
 static inline const umb_node *umb_tree_node(const umb_tree *tree, uint32_t number)
 {
     return number < tree->node_count ? &tree->nodes[number] : &tree->blocks[number - tree->node_count];
+}
+
+/* A walk opens a node. Any number of walks at once; what they note is the same in any order. */
+static inline void umb_tree_note_open(const umb_tree *tree, uint32_t node)
+{
+    if (tree->opened != NULL) {
+        uint64_t bit = (uint64_t)1 << (node & 63), *word = &tree->opened[node >> 6];
+        if ((__atomic_load_n(word, __ATOMIC_RELAXED) & bit) == 0) {
+            (void)__atomic_fetch_or(word, bit, __ATOMIC_RELAXED);
+        }
+    }
 }
 
 const umb_tree *umb_index_tree(const umb_index *index);
