@@ -59,12 +59,12 @@ static void set_up(worlds *w, const char *spec, const umb_allocator *allocator)
 
 static void tear_down(worlds *w)
 {
+    umb_culler_destroy(w->loose);
     for (int i = 0; i < INDICES; ++i) {
         umb_culler_destroy(w->raster[i]);
         umb_culler_destroy(w->all[i]);
         umb_index_destroy(w->index[i]);
     }
-    umb_culler_destroy(w->loose);
     umb_culler_destroy(w->plain_raster);
     umb_culler_destroy(w->plain_all);
     umb_index_destroy(w->plain_index);

@@ -7,7 +7,7 @@
  *
  *   by umb_cull, when its volume is seen, or no longer holds it at the view's time: it is then tested with its true
  *     bounds, in the same frame, and hides what is behind it where it truly is. A volume never hides anything
- *   by umb_scene_commit, when its volume has expired by the scene's time: it gets a new one
+ *   by umb_scene_commit, when its volume has expired by the scene's time: it gets a new one; and while it is in sight
  *
  *     umb_scene_set_poses(scene, &(umb_pose_source){where_is, world});
  *     umb_scene_set_motion(scene, id, &(umb_motion_def){.max_speed = 3});
@@ -19,7 +19,8 @@
  *     }
  *
  * How long a volume holds is adapted to each object: one that expires unseen is followed by one for twice as long; one
- * that is seen while its object is hidden, at once by one for half as long.
+ * that is seen while its object is hidden, at once by one for half as long. An object that was itself reported since the last
+ * commit is put where it is by each commit, as if it were moved by hand, until it no longer is.
  */
 #ifndef UMBRAGE_MOTION_H
 #define UMBRAGE_MOTION_H
@@ -91,6 +92,7 @@ UMB_API umb_result umb_scene_set_time(umb_scene *scene, double seconds);
 typedef struct umb_motion_stats {
     uint32_t movers;   /* objects that move by themselves */
     uint32_t fuzzy;    /* of them, those whose promise is not certain */
+    uint32_t exact;    /* of them, those that are put where they are, because they were reported */
     uint32_t renewed;  /* volumes made by the last commit */
     uint32_t expired;  /* of these: because the one before had expired */
     uint32_t revealed; /* of these: because the one before was seen and its object was not */

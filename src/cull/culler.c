@@ -555,7 +555,7 @@ static bool visit_object(walk *w, umb_waiting *item, const umb_heap_entry *entry
 {
     const umb_object *o = &w->scene->objects[item->ref & UMB_REF_NUMBER];
     umb_object posed;
-    if (o->mover != UMB_NONE) {
+    if (w->scene->motion.count > 0 && umb_movers_roams(&w->culler->movers, o)) {
         if (item->node != UMB_NONE) {
             meet_mover(w, item);
             return false;
@@ -929,7 +929,7 @@ umb_result umb_cull(umb_culler *c, const umb_view *view, umb_visible_set *out)
         write_answer(c);
     }
     w.stats.visible = c->count;
-    w.stats.hidden_movers = w.scene->motion.count - (w.scene->motion.count > 0 ? c->movers.met : 0);
+    w.stats.hidden_movers = w.scene->motion.count > 0 ? umb_movers_hidden(&c->movers) : 0;
     c->view = *view;
     c->version = w.scene->version;
     c->answered = true;

@@ -10,17 +10,21 @@
 
 /* ---- the scene as a frame sees it ----------------------------------------------------------- */
 
-static const umb_posed *tell(void *user, bool forget, uint32_t *count)
+static umb_testimony tell(void *user, bool forget)
 {
     umb_movers *m = user;
-    *count = m->posed_count;
-    m->posed_count = forget ? 0 : m->posed_count;
-    return m->posed;
+    umb_testimony t = {m->posed, m->shown, m->posed_count, m->shown_count};
+    if (forget) {
+        m->posed_count = m->shown_count = 0;
+        m->commit += 1;
+    }
+    return t;
 }
 
 void umb_movers_start(umb_movers *m, umb_scene *scene)
 {
-    m->witness.told = tell;
+    m->commit = 1;
+    m->witness.tell = tell;
     m->witness.user = m;
     umb_scene_add_witness(scene, &m->witness);
 }
@@ -31,6 +35,8 @@ void umb_movers_end(umb_movers *m, umb_scene *scene, const umb_allocator *a)
     umb_memory_free(a, m->occluders, m->occluder_capacity * sizeof *m->occluders);
     umb_memory_free(a, m->posed, m->posed_capacity * sizeof *m->posed);
     umb_memory_free(a, m->places, m->place_capacity * sizeof *m->places);
+    umb_memory_free(a, m->shown, m->shown_capacity * sizeof *m->shown);
+    umb_memory_free(a, m->shown_in, m->shown_in_capacity * sizeof *m->shown_in);
 }
 
 static void copy_owned(umb_movers *m, const umb_committed *scene, const uint32_t *objects, uint32_t count)
@@ -65,17 +71,40 @@ static void copy_occluders(umb_movers *m, const umb_committed *scene)
     m->structure = scene->structure;
 }
 
+/* At another time than the scene's exact movers are anywhere, as all others: the copies of their occluders say so, and are
+ * made anew when they count again. After a commit that failed, nobody can tell which ones they are. */
+static void strip_exact(umb_movers *m, const umb_committed *scene)
+{
+    const umb_motion *motion = &scene->motion;
+    bool all = !(motion->time < INFINITY);
+    uint32_t count = all ? motion->number_count : motion->exact_count;
+    for (uint32_t i = 0; i < count && (m->stripped || !m->now); ++i) {
+        uint32_t object = motion->objects[all ? i : motion->exact[i]];
+        uint32_t occluder = object < scene->object_count ? scene->objects[object].occluder : UMB_NONE;
+        if (occluder != UMB_NONE) {
+            m->occluders[occluder] = scene->occluders[occluder];
+            m->occluders[occluder].moves = scene->occluders[occluder].moves || !m->now;
+        }
+    }
+    m->stripped = !m->now;
+}
+
 static bool reserve(umb_movers *m, const umb_allocator *a, const umb_committed *scene, bool occluders)
 {
-    size_t numbers = scene->motion.number_count, known = m->place_capacity;
+    size_t numbers = scene->motion.number_count, known = m->place_capacity, dated = m->shown_in_capacity;
     if (!umb_memory_reserve(a, (void **)&m->posed, &m->posed_capacity, numbers, sizeof *m->posed) ||
         !umb_memory_reserve(a, (void **)&m->places, &m->place_capacity, numbers, sizeof *m->places) ||
+        !umb_memory_reserve(a, (void **)&m->shown, &m->shown_capacity, numbers, sizeof *m->shown) ||
+        !umb_memory_reserve(a, (void **)&m->shown_in, &m->shown_in_capacity, numbers, sizeof *m->shown_in) ||
         !umb_memory_reserve(a, (void **)&m->occluders, &m->occluder_capacity, occluders ? scene->occluder_count : 0,
                             sizeof *m->occluders)) {
         return false;
     }
     for (; known < m->place_capacity; ++known) {
         m->places[known] = UMB_NONE;
+    }
+    for (; dated < m->shown_in_capacity; ++dated) {
+        m->shown_in[dated] = 0;
     }
     return true;
 }
@@ -96,6 +125,7 @@ const umb_committed *umb_movers_begin(umb_movers *m, const umb_allocator *a, con
     if (m->told_time != time || m->told_version != scene->version || m->frame == UINT32_MAX) {
         m->posed_count = 0;
     }
+    m->now = time == scene->motion.time;
     m->frame = m->frame < UINT32_MAX ? m->frame + 1 : 1;
     m->met = 0;
     m->told_time = time;
@@ -103,6 +133,7 @@ const umb_committed *umb_movers_begin(umb_movers *m, const umb_allocator *a, con
     m->scene = *scene;
     if (occluders) {
         copy_occluders(m, scene);
+        strip_exact(m, scene);
         m->scene.occluders = m->occluders;
     }
     return &m->scene;
@@ -173,6 +204,7 @@ umb_object umb_movers_object(const umb_movers *m, const umb_posed *posed)
     o.bounds = posed->bounds;
     o.transform = posed->pose.transform;
     o.identity = posed->identity;
+    o.box = false; /* not known; it only saves a question */
     return o;
 }
 
@@ -199,6 +231,9 @@ void umb_movers_expired(const umb_movers *m, void (*meet)(void *user, uint32_t m
     meeting to = {m, meet, user};
     if (m->told_time >= motion->time) {
         umb_motion_expired(motion, m->told_time, meet_if_there, &to);
+        for (uint32_t i = 0; i < motion->exact_count && !m->now; ++i) {
+            meet_if_there(&to, motion->exact[i]);
+        }
         return;
     }
     for (uint32_t i = 0; i < motion->number_count; ++i) {
@@ -263,7 +298,11 @@ static bool keep(umb_movers *m, umb_in_view *v, uint32_t at, uint64_t *entry)
     *entry = v->entries != NULL ? v->entries[at] : umb_found_entry(0.0f, v->objects[at], v->inside[at] != 0);
     uint32_t object = umb_found_id(*entry);
     const umb_object *o = &m->scene.objects[object];
-    if (o->mover == UMB_NONE || (v->entries == NULL && umb_found_inside(*entry) && umb_movers_find(m, o->mover) == NULL)) {
+    if (!umb_movers_roams(m, o)) {
+        umb_movers_show(m, object);
+        return true;
+    }
+    if (v->entries == NULL && umb_found_inside(*entry) && umb_movers_find(m, o->mover) == NULL) {
         return true;
     }
     umb_posed *p = umb_movers_meet(m, object, false, v->stats);

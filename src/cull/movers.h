@@ -12,11 +12,16 @@ typedef struct umb_movers {
     umb_occluder *occluders;
     umb_posed *posed;  /* what was told for one time and one version of the scene */
     uint32_t *places;  /* per mover: where in posed it is, if it is; any number else */
-    size_t occluder_capacity, posed_capacity, place_capacity;
-    uint32_t posed_count;
+    uint32_t *shown;   /* exact movers reported since the last commit, */
+    uint64_t *shown_in; /* and for each mover the commit after which it was last put there, counted from 1 */
+    size_t occluder_capacity, posed_capacity, place_capacity, shown_capacity, shown_in_capacity;
+    uint32_t posed_count, shown_count;
     uint32_t frame, met; /* the frame that is going on; how many movers were met in it */
     uint64_t version, structure; /* of the scene that occluders is a copy of; version 0: of none */
     uint64_t told_version;       /* that poses were told for */
+    uint64_t commit;
+    bool now;      /* the frame is of the scene's time: exact movers are where they are said to be */
+    bool stripped; /* the copies of their occluders say that they are not */
     double told_time;
     umb_scene_witness witness;
 } umb_movers;
@@ -40,14 +45,31 @@ static inline umb_posed *umb_movers_find(const umb_movers *m, uint32_t mover)
  * has been met in this frame before. */
 umb_posed *umb_movers_meet(umb_movers *m, uint32_t object, bool expired, umb_cull_stats *stats);
 
+/* True if an object's bounds are no more than a volume. */
+static inline bool umb_movers_roams(const umb_movers *m, const umb_object *o)
+{
+    return o->mover != UMB_NONE && !(o->exact && m->now);
+}
+
 /* An object is reported. */
 static inline void umb_movers_show(umb_movers *m, uint32_t object)
 {
-    uint32_t mover = m->scene.objects[object].mover;
-    umb_posed *p = mover != UMB_NONE ? umb_movers_find(m, mover) : NULL;
-    if (p != NULL) {
-        p->shown = true;
+    const umb_object *o = &m->scene.objects[object];
+    if (umb_movers_roams(m, o)) {
+        umb_posed *p = umb_movers_find(m, o->mover);
+        if (p != NULL) {
+            p->shown = true;
+        }
+    } else if (o->mover != UMB_NONE && m->shown_in[o->mover] != m->commit) {
+        m->shown_in[o->mover] = m->commit;
+        m->shown[m->shown_count++] = o->mover;
     }
+}
+
+/* How many movers neither the frame nor, for it, the commit had to ask for. */
+static inline uint32_t umb_movers_hidden(const umb_movers *m)
+{
+    return m->scene.motion.count - m->met - (m->now ? m->scene.motion.exact_count : 0);
 }
 
 /* The object as it was told to be; it is known. */

@@ -43,7 +43,7 @@ void umb_once_free(umb_once *o, const umb_allocator *a)
 static const umb_aabb *whole_box(const umb_once_view *v, uint32_t id, bool *lost)
 {
     const umb_object *o = &v->scene->objects[id];
-    const umb_posed *p = v->movers != NULL && o->mover != UMB_NONE ? umb_movers_find(v->movers, o->mover) : NULL;
+    const umb_posed *p = v->movers != NULL && umb_movers_roams(v->movers, o) ? umb_movers_find(v->movers, o->mover) : NULL;
     *lost = p != NULL && !p->known;
     return p != NULL && p->known ? &p->bounds : &o->bounds;
 }

@@ -80,6 +80,11 @@ static umb_motion_def complete(const umb_motion_def *given)
     return d;
 }
 
+bool umb_motion_is_exact(const umb_scene *scene, const umb_object_slot *slot)
+{
+    return slot->mover != UMB_NONE && scene->moving.slots[slot->mover].exact;
+}
+
 static void make_due(umb_movers_state *m, uint32_t mover, uint8_t why)
 {
     if (m->slots[mover].why == 0) {
@@ -93,8 +98,11 @@ static bool reserve(umb_movers_state *m, const umb_allocator *a)
     size_t need = (size_t)m->ids.used + 1;
     return umb_ids_reserve(&m->ids, a) &&
            umb_memory_reserve(a, (void **)&m->slots, &m->slot_capacity, need, sizeof *m->slots) &&
+           umb_memory_reserve(a, (void **)&m->promises, &m->promise_capacity, need, sizeof *m->promises) &&
            umb_memory_reserve(a, (void **)&m->objects, &m->object_capacity, need, sizeof *m->objects) &&
            umb_memory_reserve(a, (void **)&m->due, &m->due_capacity, need, sizeof *m->due) &&
+           umb_memory_reserve(a, (void **)&m->exact, &m->exact_capacity, need, sizeof *m->exact) &&
+           umb_memory_reserve(a, (void **)&m->next_exact, &m->next_exact_capacity, need, sizeof *m->next_exact) &&
            umb_expiries_reserve(&m->expiries, a, (uint32_t)need);
 }
 
@@ -103,6 +111,7 @@ static void publish_arrays(umb_scene *scene)
 {
     scene->committed.motion.objects = scene->moving.objects;
     scene->committed.motion.expiries = scene->moving.expiries.heap;
+    scene->committed.motion.exact = scene->moving.exact;
 }
 
 static umb_result start(umb_scene *scene, uint32_t object, const umb_motion_def *def)
@@ -117,14 +126,16 @@ static umb_result start(umb_scene *scene, uint32_t object, const umb_motion_def 
         }
         slot->mover = umb_ids_take(&m->ids);
         m->slots[slot->mover] = (umb_mover_slot){0};
+        m->promises[slot->mover] = (umb_mover_promise){.known = {.holds = 0.0}};
         m->objects[slot->mover] = object;
         m->count += 1;
     }
     umb_mover_slot *mover = &m->slots[slot->mover];
+    umb_motion_def *kept = &m->promises[slot->mover].def;
     m->fuzzy += def->fuzzy;
-    m->fuzzy -= mover->def.fuzzy;
-    mover->def = complete(def);
-    mover->period = mover->def.first_period;
+    m->fuzzy -= kept->fuzzy;
+    *kept = complete(def);
+    mover->period = kept->first_period;
     mover->why &= (uint8_t)~UMB_DUE_STOP;
     make_due(m, slot->mover, UMB_DUE_FRESH);
     return UMB_OK;
@@ -206,7 +217,7 @@ static double stretch(uint32_t object, double period)
     return 0.75 + (double)(mixed >> 40) * 0x1p-25;
 }
 
-static void adapt(umb_movers_state *m, umb_mover_slot *mover)
+static void adapt(umb_movers_state *m, umb_mover_slot *mover, const umb_motion_def *def)
 {
     double factor = 1.0;
     if ((mover->why & UMB_DUE_REVEALED) != 0 || ((mover->why & UMB_DUE_EXPIRED) != 0 && mover->seen)) {
@@ -216,69 +227,132 @@ static void adapt(umb_movers_state *m, umb_mover_slot *mover)
     }
     m->stats.expired += (mover->why & UMB_DUE_EXPIRED) != 0;
     m->stats.revealed += (mover->why & UMB_DUE_REVEALED) != 0;
-    mover->period = fmin(fmax(mover->period * factor, mover->def.least_period), mover->def.most_period);
+    mover->period = fmin(fmax(mover->period * factor, def->least_period), def->most_period);
+}
+
+static bool ask(umb_movers_state *m, uint32_t object, umb_pose *out)
+{
+    m->stats.asked += 1;
+    return umb_motion_ask(&m->source, object, m->time, out);
 }
 
 /* The latest pose that holds now: one that a culler was told, or a new one. */
-static void know(umb_scene *scene, umb_mover_slot *mover, uint32_t object)
+static void know(umb_movers_state *m, umb_mover_slot *mover, umb_pose *known, uint32_t object)
 {
-    umb_movers_state *m = &scene->moving;
     bool told = mover->placed && (mover->why & UMB_DUE_REVEALED) != 0 && (mover->why & UMB_DUE_FRESH) == 0 &&
-                mover->known_at <= m->time &&
-                (mover->known.holds == 0.0 || mover->known_at + mover->known.holds > m->time);
+                mover->known_at <= m->time && (known->holds == 0.0 || mover->known_at + known->holds > m->time);
     if (!told) {
-        mover->placed = umb_motion_ask(&m->source, object, m->time, &mover->known);
+        mover->placed = ask(m, object, known);
         mover->known_at = m->time;
-        m->stats.asked += 1;
     }
 }
 
 /* Until when a volume made now is to hold. */
-static double expiry_of(const umb_movers_state *m, const umb_mover_slot *mover, uint32_t object)
+static double expiry_of(const umb_movers_state *m, const umb_mover_slot *mover, const umb_pose *known, uint32_t object)
 {
     double until = m->time + mover->period * stretch(object, mover->known_at);
-    return mover->known.holds > 0.0 ? fmin(until, mover->known_at + mover->known.holds) : until;
+    return known->holds > 0.0 ? fmin(until, mover->known_at + known->holds) : until;
 }
 
 /* The object never leaves a volume: nothing has to be known of where it is. */
 static void settle(umb_scene *scene, uint32_t number)
 {
     umb_movers_state *m = &scene->moving;
-    scene->objects[m->objects[number]].bounds = m->slots[number].def.volume;
+    scene->objects[m->objects[number]].bounds = m->promises[number].def.volume;
+    m->slots[number].exact = false;
     umb_expiries_set(&m->expiries, number, INFINITY);
     umb_scene_touch_object(scene, m->objects[number]);
     m->stats.renewed += 1;
 }
 
-/* Where the object's shape was last known to be, and in place of its bounds a volume. */
+/* It was seen of late, and is likely to be seen again: as long as it is, it is put where it is at each commit, like
+ * anything that is moved, which costs less than to ask for it in the walk. */
+static bool stays_exact(const umb_movers_state *m, const umb_mover_slot *mover)
+{
+    return mover->shown == m->commit && (mover->why & UMB_DUE_FRESH) == 0;
+}
+
+/* Nothing is known: it is asked for again in every cull and at every commit. */
+static void lose(umb_scene *scene, uint32_t number)
+{
+    umb_movers_state *m = &scene->moving;
+    m->slots[number].exact = m->slots[number].placed = false;
+    umb_expiries_set(&m->expiries, number, -INFINITY);
+    umb_scene_touch_object(scene, m->objects[number]);
+}
+
+/* Where a pose puts an object; NULL, or its bounds. */
+static const umb_aabb *find_place(const umb_scene *scene, uint32_t object, const umb_pose *pose, umb_outcome *out)
+{
+    const umb_aabb *bounds;
+    const umb_mesh *mesh = umb_scene_mesh(scene, scene->objects[object].placement.shape);
+    return umb_outcome_find(mesh, &pose->transform, out) == NULL &&
+                   umb_outcome_bounds(out, &pose->bounds, &bounds) == NULL
+               ? bounds
+               : NULL;
+}
+
+/* Put it where it is at the scene's time. */
+static void pin(umb_scene *scene, uint32_t number)
+{
+    umb_movers_state *m = &scene->moving;
+    uint32_t object = m->objects[number];
+    umb_object_slot *slot = &scene->objects[object];
+    umb_pose pose;
+    umb_outcome seen;
+    const umb_aabb *bounds = ask(m, object, &pose) ? find_place(scene, object, &pose, &seen) : NULL;
+    if (bounds == NULL) {
+        lose(scene, number);
+        return;
+    }
+    umb_scene_place(&slot->placement, &pose.transform, &seen);
+    slot->bounds = *bounds;
+    m->slots[number].exact = true;
+    m->next_exact[m->next_exact_count++] = number;
+    umb_expiries_set(&m->expiries, number, INFINITY);
+    umb_scene_touch_object(scene, object);
+}
+
+/* Put its shape where it was last known to be, and in place of its bounds a volume. */
 static void renew(umb_scene *scene, uint32_t number)
 {
     umb_movers_state *m = &scene->moving;
     umb_mover_slot *mover = &m->slots[number];
+    umb_mover_promise *promise = &m->promises[number];
     uint32_t object = m->objects[number];
     umb_object_slot *slot = &scene->objects[object];
-    const umb_mesh *mesh = umb_scene_mesh(scene, slot->placement.shape);
     umb_outcome seen;
-    const umb_aabb *bounds = NULL;
-    adapt(m, mover);
-    know(scene, mover, object);
-    const umb_pose *pose = &mover->known;
-    mover->placed = mover->placed && umb_outcome_find(mesh, &pose->transform, &seen) == NULL &&
-                    umb_outcome_bounds(&seen, &pose->bounds, &bounds) == NULL;
-    mover->seen = false;
-    if (!mover->placed) { /* nothing is known: it is asked for again in every cull and at every commit */
-        umb_expiries_set(&m->expiries, number, -INFINITY);
-        umb_scene_touch_object(scene, object);
+    adapt(m, mover, &promise->def);
+    know(m, mover, &promise->known, object);
+    const umb_pose *pose = &promise->known;
+    const umb_aabb *bounds = mover->placed ? find_place(scene, object, pose, &seen) : NULL;
+    mover->seen = mover->exact = false;
+    if (bounds == NULL) {
+        lose(scene, number);
         return;
     }
     umb_scene_place(&slot->placement, &pose->transform, &seen);
-    double until = expiry_of(m, mover, object);
+    double until = expiry_of(m, mover, pose, object);
+    const umb_mesh *mesh = umb_scene_mesh(scene, slot->placement.shape);
     const umb_aabb *local = mesh != NULL && umb_box_is_zero(&pose->bounds) ? &mesh->bounds : NULL;
     umb_tbv_start from = {.local = local, .pose = pose, .bounds = bounds};
-    slot->bounds = umb_tbv_swept(&mover->def, &from, nextafter(until - mover->known_at, INFINITY));
+    slot->bounds = umb_tbv_swept(&promise->def, &from, nextafter(until - mover->known_at, INFINITY));
     umb_expiries_set(&m->expiries, number, until);
     umb_scene_touch_object(scene, object);
     m->stats.renewed += 1;
+}
+
+/* Make the volume of a mover that is due, or what there is in its place. */
+static void make_volume(umb_scene *scene, uint32_t number)
+{
+    const umb_movers_state *m = &scene->moving;
+    if (stays_exact(m, &m->slots[number])) {
+        pin(scene, number);
+    } else if (m->promises[number].def.kind == UMB_MOTION_VOLUME) {
+        settle(scene, number);
+    } else {
+        renew(scene, number);
+    }
 }
 
 /* Let it stand where it is now. Its number stays in use until readers no longer know it. */
@@ -289,16 +363,13 @@ static void stop(umb_scene *scene, uint32_t number)
     umb_object_slot *slot = &scene->objects[object];
     umb_pose pose;
     umb_outcome seen;
-    const umb_aabb *bounds;
     if (slot->state != UMB_SLOT_USED || slot->mover != number) {
         return;
     }
     slot->mover = UMB_NONE;
     umb_scene_touch_object(scene, object);
-    m->stats.asked += 1;
-    if (umb_motion_ask(&m->source, object, m->time, &pose) &&
-        umb_outcome_find(umb_scene_mesh(scene, slot->placement.shape), &pose.transform, &seen) == NULL &&
-        umb_outcome_bounds(&seen, &pose.bounds, &bounds) == NULL) {
+    const umb_aabb *bounds = ask(m, object, &pose) ? find_place(scene, object, &pose, &seen) : NULL;
+    if (bounds != NULL) {
         umb_scene_place(&slot->placement, &pose.transform, &seen);
         slot->bounds = *bounds;
     }
@@ -313,34 +384,75 @@ static bool concerns(const umb_movers_state *m, const umb_posed *told)
            (m->slots[told->mover].why & (UMB_DUE_FRESH | UMB_DUE_STOP)) == 0;
 }
 
-/* Twice through what all cullers were told: who was shown by any of them, then who was not. The order of cullers
- * decides nothing: the latest pose counts, and poses of one time are one. */
+/* What one culler says of who was seen. */
+static void hear(umb_movers_state *m, const umb_testimony *t)
+{
+    for (uint32_t i = 0; i < t->shown_count; ++i) {
+        if (t->shown[i] < m->ids.used) {
+            m->slots[t->shown[i]].shown = m->commit;
+        }
+    }
+    for (uint32_t i = 0; i < t->posed_count; ++i) {
+        const umb_posed *told = &t->posed[i];
+        if (!concerns(m, told)) {
+            continue;
+        }
+        umb_mover_slot *mover = &m->slots[told->mover];
+        mover->shown = told->shown ? m->commit : mover->shown;
+        mover->seen = mover->seen || !told->expired;
+        if (told->known && (!mover->placed || told->time >= mover->known_at)) {
+            m->promises[told->mover].known = told->pose;
+            mover->known_at = told->time;
+            mover->placed = true;
+        }
+    }
+}
+
+/* What follows from it, when all have been heard. */
+static void conclude(umb_movers_state *m, const umb_testimony *t)
+{
+    for (uint32_t i = 0; i < t->posed_count; ++i) {
+        const umb_posed *told = &t->posed[i];
+        if (!concerns(m, told)) {
+            continue;
+        }
+        const umb_mover_slot *mover = &m->slots[told->mover];
+        const umb_motion_def *def = &m->promises[told->mover].def;
+        if (mover->shown == m->commit) {
+            make_due(m, told->mover, UMB_DUE_SHOWN);
+        } else if (!told->expired && mover->period > def->least_period && def->kind == UMB_MOTION_SPEED) {
+            make_due(m, told->mover, UMB_DUE_REVEALED);
+        }
+    }
+}
+
+/* Exact ones are so for a time only, and as long as they are seen. */
+static void follow_exact(umb_movers_state *m, bool time_goes_on)
+{
+    m->next_exact_count = 0;
+    for (uint32_t i = 0; i < m->exact_count; ++i) {
+        const umb_mover_slot *mover = &m->slots[m->exact[i]];
+        if (time_goes_on || mover->shown != m->commit || mover->why != 0) {
+            make_due(m, m->exact[i], UMB_DUE_SHOWN);
+        } else {
+            m->next_exact[m->next_exact_count++] = m->exact[i];
+        }
+    }
+}
+
+/* The order of cullers decides nothing: the latest pose counts, and poses of one time are one. Exact ones are due first:
+ * they are many, and in order. */
 static void listen(umb_scene *scene)
 {
     umb_movers_state *m = &scene->moving;
-    for (int pass = 0; pass < 2; ++pass) {
-        for (umb_scene_witness *w = m->witnesses; w != NULL; w = w->next) {
-            uint32_t count;
-            const umb_posed *told = w->told(w->user, pass == 1, &count);
-            for (uint32_t i = 0; i < count; ++i) {
-                if (!concerns(m, &told[i])) {
-                    continue;
-                }
-                umb_mover_slot *mover = &m->slots[told[i].mover];
-                if (pass == 0) {
-                    mover->shown = told[i].shown ? m->commit : mover->shown;
-                    mover->seen = mover->seen || !told[i].expired;
-                    if (told[i].known && (!mover->placed || told[i].time >= mover->known_at)) {
-                        mover->known = told[i].pose;
-                        mover->known_at = told[i].time;
-                        mover->placed = true;
-                    }
-                } else if (mover->shown != m->commit && !told[i].expired &&
-                           mover->period > mover->def.least_period && mover->def.kind == UMB_MOTION_SPEED) {
-                    make_due(m, told[i].mover, UMB_DUE_REVEALED);
-                }
-            }
-        }
+    for (umb_scene_witness *w = m->witnesses; w != NULL; w = w->next) {
+        umb_testimony t = w->tell(w->user, false);
+        hear(m, &t);
+    }
+    follow_exact(m, m->time != m->made_at);
+    for (umb_scene_witness *w = m->witnesses; w != NULL; w = w->next) {
+        umb_testimony t = w->tell(w->user, true);
+        conclude(m, &t);
     }
 }
 
@@ -371,11 +483,55 @@ void umb_motion_commit(umb_scene *scene)
     for (uint32_t i = 0; i < m->due_count; ++i) {
         if ((m->slots[m->due[i]].why & UMB_DUE_STOP) != 0) {
             stop(scene, m->due[i]);
-        } else if (m->slots[m->due[i]].def.kind == UMB_MOTION_VOLUME) {
-            settle(scene, m->due[i]);
         } else {
-            renew(scene, m->due[i]);
+            make_volume(scene, m->due[i]);
         }
+    }
+}
+
+static void sink(uint32_t *numbers, uint32_t at, uint32_t count)
+{
+    uint32_t number = numbers[at];
+    for (uint32_t child = 2 * at + 1; child < count; child = 2 * at + 1) {
+        child += child + 1 < count && numbers[child + 1] > numbers[child];
+        if (numbers[child] <= number) {
+            break;
+        }
+        numbers[at] = numbers[child];
+        at = child;
+    }
+    numbers[at] = number;
+}
+
+/* In place, without memory. */
+static void sort_numbers(uint32_t *numbers, uint32_t count)
+{
+    for (uint32_t i = count / 2; i-- > 0;) {
+        sink(numbers, i, count);
+    }
+    for (uint32_t i = count; i-- > 1;) {
+        uint32_t last = numbers[i];
+        numbers[i] = numbers[0];
+        numbers[0] = last;
+        sink(numbers, 0, i);
+    }
+}
+
+/* Bring the exact ones in order, of which all but a few at the end are: commits then go through memory in order, which for
+ * thousands is worth more than anything else. due is room to work in. */
+static void order_exact(umb_movers_state *m)
+{
+    uint32_t *list = m->exact, count = m->exact_count, sorted = count > 0 ? 1 : 0, to = count;
+    while (sorted < count && list[sorted] > list[sorted - 1]) {
+        ++sorted;
+    }
+    uint32_t rest = count - sorted;
+    sort_numbers(list + sorted, rest);
+    for (uint32_t i = 0; i < rest; ++i) {
+        m->due[i] = list[sorted + i];
+    }
+    while (rest > 0) {
+        list[--to] = sorted > 0 && list[sorted - 1] > m->due[rest - 1] ? list[--sorted] : m->due[--rest];
     }
 }
 
@@ -388,18 +544,28 @@ void umb_motion_committed(umb_scene *scene)
             umb_expiries_set(&m->expiries, number, INFINITY);
             m->objects[number] = UMB_NONE;
             m->count -= 1;
-            m->fuzzy -= m->slots[number].def.fuzzy;
+            m->fuzzy -= m->promises[number].def.fuzzy;
+            m->slots[number].exact = false;
             umb_ids_release(&m->ids, number);
         }
         m->slots[number].why = 0;
     }
     m->due_count = 0;
+    uint32_t *exact = m->exact;
+    size_t exact_capacity = m->exact_capacity;
+    m->exact = m->next_exact;
+    m->exact_capacity = m->next_exact_capacity;
+    m->exact_count = m->next_exact_count;
+    m->next_exact = exact;
+    m->next_exact_capacity = exact_capacity;
+    order_exact(m);
     umb_ids_commit(&m->ids);
     umb_motion *c = &scene->committed.motion;
     publish_arrays(scene);
     c->number_count = m->ids.used;
     c->count = m->count;
     c->expiry_count = m->expiries.count;
+    c->exact_count = m->exact_count;
     c->fuzzy = m->fuzzy;
     c->time = m->time;
 }
@@ -412,6 +578,7 @@ void umb_scene_get_motion_stats(const umb_scene *scene, umb_motion_stats *out)
     *out = m->stats;
     out->movers = m->count;
     out->fuzzy = m->fuzzy;
+    out->exact = m->exact_count;
     double sum = 0.0;
     for (uint32_t i = 0; i < m->expiries.count; ++i) {
         sum += m->slots[m->expiries.heap[i].mover].period;
@@ -425,15 +592,19 @@ void umb_motion_free(umb_scene *scene)
     const umb_allocator *a = &scene->allocator;
     umb_ids_free(&m->ids, a);
     umb_memory_free(a, m->slots, m->slot_capacity * sizeof *m->slots);
+    umb_memory_free(a, m->promises, m->promise_capacity * sizeof *m->promises);
     umb_memory_free(a, m->objects, m->object_capacity * sizeof *m->objects);
     umb_memory_free(a, m->due, m->due_capacity * sizeof *m->due);
+    umb_memory_free(a, m->exact, m->exact_capacity * sizeof *m->exact);
+    umb_memory_free(a, m->next_exact, m->next_exact_capacity * sizeof *m->next_exact);
     umb_expiries_free(&m->expiries, a);
 }
 
 size_t umb_motion_memory(const umb_scene *scene)
 {
     const umb_movers_state *m = &scene->moving;
-    return umb_ids_memory(&m->ids) + m->slot_capacity * sizeof *m->slots +
+    return umb_ids_memory(&m->ids) + m->slot_capacity * sizeof *m->slots + m->promise_capacity * sizeof *m->promises +
            m->object_capacity * sizeof *m->objects + m->due_capacity * sizeof *m->due +
+           (m->exact_capacity + m->next_exact_capacity) * sizeof *m->exact +
            umb_expiries_memory(&m->expiries);
 }

@@ -15,8 +15,9 @@ typedef struct umb_motion {
     umb_pose_source source;
     const uint32_t *objects;     /* per mover; UMB_NONE where the number is not in use */
     const umb_expiry *expiries;  /* of those whose volume ever expires */
+    const uint32_t *exact;       /* those that were seen of late: not a volume, but where they are at `time` is known */
     uint32_t number_count;       /* every mover's number is below */
-    uint32_t count, expiry_count, fuzzy;
+    uint32_t count, expiry_count, exact_count, fuzzy;
     double time; /* volumes hold from here on, each until it expires. INFINITY: a commit failed, none is to be trusted */
 } umb_motion;
 
@@ -26,7 +27,7 @@ void umb_motion_expired(const umb_motion *motion, double time, void (*meet)(void
 /* Ask for a pose; false: nothing is known. */
 bool umb_motion_ask(const umb_pose_source *source, uint32_t object, double time, umb_pose *out);
 
-/* What a culler was told of a mover, and what became of it. */
+/* What a culler was told of a mover, and what became of it. Of an exact one it need not be told. */
 typedef struct umb_posed {
     uint32_t mover, object;
     double time;

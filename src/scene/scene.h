@@ -27,6 +27,7 @@ typedef struct umb_object {
     bool used : 1;        /* the id is in use */
     bool live : 1;        /* in use and not UMB_OBJECT_IGNORED */
     bool identity : 1;
+    bool exact : 1;       /* of a mover: at the scene's time it is like any other, bounds and transform say where it is */
     bool refine : 1;      /* UMB_OBJECT_IS_SHAPE: the mesh's parts say where it is */
     bool body : 1;        /* refine, and its shape is a convex body, all of which blocks: what its occluder is, if it
                              has one */
@@ -52,10 +53,17 @@ typedef struct umb_committed {
     umb_motion motion;
 } umb_committed;
 
-/* Cullers register to be asked at each commit what they were told of moving objects: *count of it, which is theirs, and
- * forgotten when forget is set. Registering is safe from several threads at once, but not during a commit. */
+/* What a culler has to say at a commit. */
+typedef struct umb_testimony {
+    const umb_posed *posed;  /* movers that it asked for */
+    const uint32_t *shown;   /* numbers of exact ones that it reported */
+    uint32_t posed_count, shown_count;
+} umb_testimony;
+
+/* Cullers register to be asked at each commit what they saw of moving objects. It is theirs, and forgotten when forget is
+ * set. Registering is safe from several threads at once, but not during a commit. */
 typedef struct umb_scene_witness {
-    const umb_posed *(*told)(void *user, bool forget, uint32_t *count);
+    umb_testimony (*tell)(void *user, bool forget);
     void *user;
     struct umb_scene_witness *next;
 } umb_scene_witness;

@@ -8,6 +8,11 @@ static bool owns_occluder(const umb_scene *scene, const umb_object_slot *slot)
     return slot->weld == UMB_NONE && umb_scene_object_hides(scene, slot);
 }
 
+static bool moves(const umb_scene *scene, const umb_object_slot *slot)
+{
+    return slot->mover != UMB_NONE && !umb_motion_is_exact(scene, slot);
+}
+
 static umb_occluder make_occluder(const umb_scene *scene, const umb_placement *p, uint32_t owner)
 {
     umb_occluder o = {.mesh = umb_scene_mesh(scene, p->shape),
@@ -16,7 +21,7 @@ static umb_occluder make_occluder(const umb_scene *scene, const umb_placement *p
                       .owner = owner,
                       .identity = p->identity,
                       .mirrored = p->mirrored};
-    o.moves = owner != UMB_NONE && scene->objects[owner].mover != UMB_NONE;
+    o.moves = owner != UMB_NONE && moves(scene, &scene->objects[owner]);
     return o;
 }
 
@@ -40,7 +45,7 @@ static bool is_box(const umb_object *o, const umb_placement *p)
     for (int i = 0; i < 3; ++i) {
         along = along && o->bounds.min[i] == p->block_bounds.min[i] && o->bounds.max[i] == p->block_bounds.max[i];
     }
-    return o->boxed && o->mover == UMB_NONE && along;
+    return o->boxed && (o->mover == UMB_NONE || o->exact) && along;
 }
 
 static umb_object make_object(const umb_scene *scene, const umb_object_slot *slot, uint32_t occluder)
@@ -52,6 +57,7 @@ static umb_object make_object(const umb_scene *scene, const umb_object_slot *slo
         o.transform = slot->placement.transform;
         o.used = true;
         o.mover = slot->mover;
+        o.exact = umb_motion_is_exact(scene, slot);
         o.live = (slot->flags & UMB_OBJECT_IGNORED) == 0;
         o.identity = slot->placement.identity;
         o.refine = o.mesh != NULL && (slot->flags & UMB_OBJECT_IS_SHAPE) != 0;
@@ -247,6 +253,7 @@ static void commit_moved(umb_scene *scene)
         object->transform = p->transform;
         object->identity = p->identity;
         object->mover = slot->mover;
+        object->exact = umb_motion_is_exact(scene, slot);
         object->box = is_box(object, p);
         if (object->occluder != UMB_NONE) {
             umb_occluder *occluder = &scene->committed_occluders[object->occluder];
@@ -254,7 +261,7 @@ static void commit_moved(umb_scene *scene)
             occluder->bounds = p->block_bounds;
             occluder->identity = p->identity;
             occluder->mirrored = p->mirrored;
-            occluder->moves = slot->mover != UMB_NONE;
+            occluder->moves = moves(scene, slot);
         }
         scene->committed_moved[count] = scene->touched[i];
         count += object->live ? 1u : 0u;

@@ -55,23 +55,29 @@ typedef struct umb_occluder_source {
     bool replaced;         /* its number is in the list */
 } umb_occluder_source;
 
-/* What is known of an object that moves by itself. */
+/* What is known of an object that moves by itself: what every commit looks at, */
 typedef struct umb_mover_slot {
-    umb_motion_def def;
-    umb_pose known;  /* where it was last known to be, */
-    double known_at; /* and when; its volume grows from there */
+    double known_at; /* when its pose was known; its volume grows from there */
     double period;   /* that its volume was made to hold for */
-    uint8_t why;     /* UMB_DUE_*: it is in the list of those that are due, for these reasons; 0: it is not */
-    bool placed;     /* known is known */
-    bool seen;       /* its volume was seen since it was made */
     uint64_t shown;  /* the last commit that heard of its being reported */
+    uint8_t why;     /* UMB_DUE_*: it is in the list of those that are due, for these reasons; 0: it is not */
+    bool placed;     /* its pose is known */
+    bool seen;       /* its volume was seen since it was made */
+    bool exact;      /* its volume is where it is at the scene's time, no more */
 } umb_mover_slot;
+
+/* and what is looked at when a volume is made. */
+typedef struct umb_mover_promise {
+    umb_motion_def def;
+    umb_pose known; /* of an exact one: out of date */
+} umb_mover_promise;
 
 enum {
     UMB_DUE_FRESH = 1u << 0,    /* its motion is new */
     UMB_DUE_EXPIRED = 1u << 1,  /* its volume no longer holds */
     UMB_DUE_REVEALED = 1u << 2, /* its volume was seen and it was not */
-    UMB_DUE_STOP = 1u << 3      /* it is to stand still, or was removed */
+    UMB_DUE_STOP = 1u << 3,     /* it is to stand still, or was removed */
+    UMB_DUE_SHOWN = 1u << 4     /* it was reported lately, or before that */
 };
 
 /* The movers of a scene; motion.c. */
@@ -79,11 +85,13 @@ typedef struct umb_movers_state {
     umb_pose_source source;
     umb_ids ids;
     umb_mover_slot *slots;
+    umb_mover_promise *promises;
     uint32_t *objects;  /* of each; UMB_NONE where the number is not in use */
     uint32_t *due;      /* whose volumes are to be made anew, each once; room for all */
+    uint32_t *exact, *next_exact; /* as committed, and from the next commit on */
     umb_expiries expiries;
-    size_t slot_capacity, object_capacity, due_capacity;
-    uint32_t due_count, count, fuzzy;
+    size_t slot_capacity, promise_capacity, object_capacity, due_capacity, exact_capacity, next_exact_capacity;
+    uint32_t due_count, exact_count, next_exact_count, count, fuzzy;
     double time;        /* from the next commit on */
     double made_at;     /* the time at the last commit, though it failed */
     uint64_t commit;    /* its number */
@@ -154,6 +162,8 @@ void umb_scene_place(umb_placement *p, const umb_transform *transform, const umb
  * volumes made anew, and cannot fail. Until umb_motion_committed() has been called, volumes are not to be trusted. */
 void umb_motion_commit(umb_scene *scene);
 void umb_motion_committed(umb_scene *scene);
+/* True if where the object is at the scene's time is known, though it moves. */
+bool umb_motion_is_exact(const umb_scene *scene, const umb_object_slot *slot);
 /* The object of a slot is removed. */
 void umb_motion_remove(umb_scene *scene, const umb_object_slot *slot);
 void umb_motion_free(umb_scene *scene);
