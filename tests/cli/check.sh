@@ -21,3 +21,9 @@ hidden=$("$umbrage" cull $scene $rows --row 5 --json --list | jq -c .ids >seen
     "$umbrage" cull $scene $rows --row 5 --json --list --method none | jq --slurpfile seen seen '.ids - $seen[0] | .[-1]')
 "$umbrage" explain $scene $rows --row 5 --object "$hidden" --json --grid 128x64 --rays 50k |
     jq -c '[.verdict, .truth, .reason, (.blockers | length > 0), (.blockers[0] | keys_unsorted)]'
+
+# Half of the objects move by themselves; the oracle looks where they are. Nobody asks for most of them.
+run check $scene $rows --every 16 --moving 0.5,3 --step 0.7 --grid 128x64 --rays 50k --json
+jq -c '[.class, .wrongly_hidden, .reported_visible > 0]' out
+run walk $scene $rows --moving 0.5,3 --json
+jq -c '.frames[1:] | [(map(.stats.hidden_movers) | add) > 2 * (map(.stats.poses) | add), (map(.stats.expired + .stats.strays) | add)]' out

@@ -90,6 +90,11 @@ run cull $scene $view --coherence list
 run walk $scene --path gen:blocks --coherence list,,rest
 run walk $scene --path gen:blocks --coherence lists
 run walk $scene --path gen:blocks --occluder-budget 0
+run walk $scene --path gen:blocks --moving 2,1
+run walk $scene --path gen:blocks --moving 0.5
+run check $scene --path gen:blocks --step 1
+run check $scene --path gen:blocks --moving 0.5,1 --step 0
+run cull $scene $view --moving 0.5,1
 run walk $scene
 run walk $scene --path gen:blocks --from 64
 run walk $scene --path gen:blocks --from 5 --to 4

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "frame.h"
+#include "moving.h"
 #include "part_file.h"
 #include "progress.h"
 #include "truth/truth.h"
@@ -88,7 +89,18 @@ static bool compare(check *c, checked *v, const truth_result *r, const uint8_t *
     return true;
 }
 
-static int check_view(const setup *s, const options *o, truth *oracle, const umb_view *view,
+/* The oracle sees the objects where they are in this view. */
+static truth *oracle_of(setup *s, truth *oracle, const umb_view *view, umb_error *error)
+{
+    if (!s->moving) {
+        return oracle;
+    }
+    truth_destroy(oracle);
+    moving_pose_model(s, view->time);
+    return truth_create(s->model, error);
+}
+
+static int check_view(setup *s, const options *o, truth *oracle, const umb_view *view,
                       uint8_t *hidden, check *c, checked *out)
 {
     umb_visible_set set;
@@ -134,7 +146,7 @@ static void add_total(check *c, const checked *v)
     c->budget_spent += v->budget_spent;
 }
 
-static int check_all(const setup *s, const options *o, const views *v, check *c)
+static int check_all(setup *s, const options *o, const views *v, check *c)
 {
     umb_error error = {0};
     truth *oracle = truth_create(s->model, &error);
@@ -151,7 +163,9 @@ static int check_all(const setup *s, const options *o, const views *v, check *c)
     for (uint32_t k = 0; code == EXIT_DONE && k < v->count; ++k) {
         umb_view view = setup_view(s, o, v, k);
         c->views[k].row = setup_row(v, k);
-        code = check_view(s, o, oracle, &view, hidden, c, &c->views[k]);
+        oracle = oracle_of(s, oracle, &view, &error);
+        code = oracle ? check_view(s, o, oracle, &view, hidden, c, &c->views[k])
+                      : fail(o, EXIT_INPUT, "the oracle: %s", error.text);
         add_total(c, &c->views[k]);
         progress_step(&p, k + 1);
     }

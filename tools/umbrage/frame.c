@@ -6,6 +6,7 @@
 #include <string.h>
 #include <xxhash.h>
 
+#include "moving.h"
 #include "progress.h"
 
 static int compare_ids(const void *a, const void *b)
@@ -63,7 +64,8 @@ int frame_answer(const setup *s, const options *o, const umb_view *view, bool wi
     umb_visible_set seen;
     memset(out, 0, sizeof *out);
     double start = progress_clock();
-    umb_result result = umb_cull(s->culler, view, &seen);
+    umb_result result = s->moving ? moving_advance(s, view) : UMB_OK;
+    result = result == UMB_OK ? umb_cull(s->culler, view, &seen) : result;
     out->time_ms = nearbyint((progress_clock() - start) * 1e6) / 1e6; /* the clock's nanoseconds */
     if (result != UMB_OK) {
         return answer_failure(s, o, result);
@@ -133,6 +135,10 @@ void frame_json(const frame *f, json_text *j)
     json_text_count(j, "saved", f->stats.saved);
     json_text_count(j, "resting", f->stats.resting);
     json_text_count(j, "over_budget", f->stats.over_budget);
+    json_text_count(j, "poses", f->stats.poses);
+    json_text_count(j, "expired", f->stats.expired);
+    json_text_count(j, "strays", f->stats.strays);
+    json_text_count(j, "hidden_movers", f->stats.hidden_movers);
     json_text_close(j, '}');
     if (f->ids) {
         json_text_ids(j, "ids", f->ids, f->stats.visible);

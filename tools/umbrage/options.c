@@ -231,6 +231,18 @@ static const char *read_every(options *o, const char *text)
     return count(text, 1, UINT32_MAX - 1, &o->every) ? NULL : "a whole number from 1";
 }
 
+static const char *read_moving(options *o, const char *text)
+{
+    return numbers(text, 2, o->moving) && o->moving[0] >= 0.0 && o->moving[0] <= 1.0 && o->moving[1] > 0.0
+               ? NULL
+               : "a share from 0 to 1 and a speed above 0: 0.1,3";
+}
+
+static const char *read_step(options *o, const char *text)
+{
+    return number(text, &o->step) || !(o->step > 0.0) ? "seconds above 0" : NULL;
+}
+
 static const char *read_method(options *o, const char *text)
 {
     for (int m = UMB_METHOD_RASTER; m <= UMB_METHOD_OCCLUSION_TREE; ++m) {
@@ -457,6 +469,8 @@ static const option_spec specs[] = {
     {"umbrae", 0, BIT(REGION), "K", read_umbrae, "intervals kept a direction, 1 to 8 (default 2)"},
     {"outer", 0, BIT(REGION), "R", read_outer, "rays by two squares, the outer R times the inner (default: slabs)"},
     {"half-umbra", 0, BIT(REGION), NULL, read_flag, "only what stands on the ground hides, and only its top counts"},
+    {"moving", 0, MANY_VIEWS, "P,V", read_moving, "a part P of the objects goes round by itself, V units a second"},
+    {"step", 0, MANY_VIEWS, "S", read_step, "--moving: seconds from row to row (default 1/60)"},
     {"up", 0, VIEWS | BIT(REGION), "DIR", read_up, "up: x, y, z or X,Y,Z (default: as info says)"},
     {"fov", 0, VIEWS, "DEG", read_fov, "vertical field of view (default 60)"},
     {"ortho", 0, VIEWS, "HEIGHT", read_ortho, "parallel lines; height of the view instead of --fov"},
@@ -583,6 +597,7 @@ static void set_defaults(const command *c, options *out)
                      .near_depth = 0.1,
                      .to = UINT32_MAX,
                      .every = 1,
+                     .step = 1.0 / 60,
                      .threads = 1,
                      .repeat = 5,
                      .pictures = PICTURE_EYE};

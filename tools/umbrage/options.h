@@ -42,6 +42,7 @@ typedef struct options {
     uint32_t plane_count;
     uint32_t width, height, buffer_width, buffer_height;
     uint32_t row, from, to, every;
+    double moving[2], step; /* share of the objects, speed; seconds from row to row */
 
     umb_method method;
     umb_index_def index;

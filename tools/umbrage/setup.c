@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "moving.h"
 #include "progress.h"
 
 /* ---- scene ---------------------------------------------------------------------------------- */
@@ -75,11 +76,15 @@ int setup_scene(setup *s, const options *o)
         }
         s->tasks = umb_pool_tasks(s->pool);
     }
-    bool weld = !options_given(o, "no-weld");
+    bool weld = !options_given(o, "no-weld"), moves = options_given(o, "moving");
     progress_note(o, "building scene and index");
-    s->scene = model_scene(s->model, weld, s->tasks, &s->weld, &s->error);
+    s->scene = model_scene(s->model, weld && !moves, s->tasks, &s->weld, &s->error);
     if (!s->scene) {
         return fail(o, EXIT_INPUT, "%s: %s", o->input, s->error.text);
+    }
+    code = moves ? moving_start(s, o, weld) : EXIT_DONE;
+    if (code != EXIT_DONE) {
+        return code;
     }
     umb_index_def def = o->index;
     def.tasks = s->tasks;
@@ -119,6 +124,7 @@ void setup_free(setup *s)
     umb_culler_destroy(s->culler);
     umb_index_destroy(s->index);
     umb_scene_destroy(s->scene);
+    moving_free(s->moving);
     umb_pool_destroy(s->pool);
     model_free(s->model);
     memset(s, 0, sizeof *s);
@@ -213,6 +219,9 @@ static int check_choices(const options *o)
         return fail(o, EXIT_USAGE, "--%s needs --sun",
                     options_given(o, "slice") ? "slice" : "reach");
     }
+    if (options_given(o, "step") && !options_given(o, "moving")) {
+        return fail(o, EXIT_USAGE, "--step needs --moving");
+    }
     static const char *const row_options[] = {"row", "from", "to", "every"};
     for (int i = 0; i < 4; ++i) {
         if (!o->path && options_given(o, row_options[i])) {
@@ -254,5 +263,6 @@ umb_view setup_view(const setup *s, const options *o, const views *v, uint32_t k
     umb_view view;
     umb_error error;
     setup_make_view(s->model, o, v->path.rows[setup_row(v, k)], &view, &error);
+    view.time = setup_row(v, k) * o->step;
     return view;
 }

@@ -4,9 +4,12 @@
 
 #include "options.h"
 
+typedef struct moving moving; /* moving.h */
+
 typedef struct setup {
     model *model;
     umb_scene *scene;
+    moving *moving;      /* with --moving, else NULL */
     umb_index *index;
     umb_culler *culler;  /* the method that was asked for */
     umb_culler *frustum; /* method none: what meets the frustum at all */
