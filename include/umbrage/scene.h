@@ -23,7 +23,7 @@ typedef struct umb_scene umb_scene;
 typedef struct umb_scene_def {
     umb_allocator allocator; /* zeroed: malloc and free */
     umb_error *error;        /* text of failures; may be NULL; must outlive the scene */
-    double origin[3];        /* what was subtracted from the file's coordinates; kept, never used */
+    double origin[3];        /* what was subtracted from the file's coordinates; kept (umb_scene_get_origin) */
 } umb_scene_def;
 
 /* Per-triangle marks. */
@@ -79,7 +79,12 @@ UMB_API umb_result umb_scene_add_object(umb_scene *scene, const umb_object_def *
  * that move by themselves (motion.h). */
 UMB_API umb_result umb_scene_move_object(umb_scene *scene, uint32_t object,
                                          const umb_transform *transform, const umb_aabb *bounds);
-/* Replace the UMB_OBJECT_* flags of an object. Dissolves welds as moving does. */
+/* The same with the place in doubles, relative to the scene's origin: transform's translation is not looked at, and its floats
+ * become position rounded once, now and after every umb_scene_shift_origin(). */
+UMB_API umb_result umb_scene_place_object(umb_scene *scene, uint32_t object, const umb_transform *transform,
+                                          const double position[3], const umb_aabb *bounds);
+/* Replace the UMB_OBJECT_* flags of an object: hide it for a time (IGNORED), or let it hide nothing while it is open
+ * (NEVER_HIDES). Dissolves welds as moving does. */
 UMB_API umb_result umb_scene_flag_object(umb_scene *scene, uint32_t object, uint32_t flags);
 /* Take an object out. Dissolves welds as moving does. */
 UMB_API umb_result umb_scene_remove_object(umb_scene *scene, uint32_t object);
@@ -89,6 +94,23 @@ UMB_API umb_result umb_scene_remove_object(umb_scene *scene, uint32_t object);
 UMB_API umb_result umb_scene_add_occluder(umb_scene *scene, umb_shape shape,
                                           const umb_transform *transform, uint32_t *out);
 UMB_API umb_result umb_scene_remove_occluder(umb_scene *scene, uint32_t occluder);
+/* Let a hand-made occluder hide nothing while it is open, as a door does; it keeps its number. From the next commit on, whose
+ * work is that of one change. */
+UMB_API umb_result umb_scene_open_occluder(umb_scene *scene, uint32_t occluder, bool open);
+
+/* Move the origin by shift: what was at x is at x - shift, and umb_scene_get_origin() grows by shift. For worlds so large that
+ * floats far from the origin are too coarse: keep it near the viewer. At once for calls, at the next commit for readers;
+ * views, matrices and what the pose callback (motion.h) tells are in the new coordinates from then on.
+ *   Every transform keeps its translation in doubles (those of umb_scene_place_object(), or what the floats were), of which
+ * the floats are rounded: a vertex is off by at most half a step of floats at its new place, and errors of several
+ * shifts do not add up. Where all translations and shifts are multiples of one step, at most 2^53 of it, and the floats hold
+ * their differences (they do for multiples of the coarsest float step that gets nearer to the origin), nothing is rounded.
+ * Bounds of shapes are found again; bounds given by hand, and volumes, are rounded outwards and grow by one float step.
+ *   Welds are dissolved: weld again. Errors: UMB_ERROR_ARGUMENT if the shift is not finite or moves anything beyond the range
+ * of floats; nothing has changed then. Cost: every object is moved. */
+UMB_API umb_result umb_scene_shift_origin(umb_scene *scene, const double shift[3]);
+/* The origin: umb_scene_def.origin and all shifts. Add it to a scene's coordinates to get the world's. */
+UMB_API void umb_scene_get_origin(const umb_scene *scene, double out[3]);
 
 /* How static neighbours are joined. */
 typedef struct umb_weld_def {
@@ -133,6 +155,21 @@ UMB_API bool umb_scene_object_bounds(const umb_scene *scene, uint32_t object, um
 UMB_API uint32_t umb_scene_occluder_count(const umb_scene *scene);
 /* Box around all objects as committed; false if there is none. */
 UMB_API bool umb_scene_bounds(const umb_scene *scene, umb_aabb *out);
+/* What there is, as committed. */
+typedef struct umb_scene_stats {
+    uint32_t objects;     /* ids in use */
+    uint32_t ignored;     /* of them, those with UMB_OBJECT_IGNORED */
+    uint32_t movers;      /* of them, those that move by themselves (motion.h) */
+    uint32_t occluders;   /* shapes of objects that hide by themselves, and */
+    uint32_t stand_alone; /* of these, welded and hand-made ones */
+    uint32_t welds;       /* groups of objects that are joined */
+    uint32_t shapes;
+    uint64_t triangles;   /* of all shapes, each once */
+    size_t bytes;         /* umb_scene_memory() */
+} umb_scene_stats;
+
+/* Looks at every object. */
+UMB_API void umb_scene_get_stats(const umb_scene *scene, umb_scene_stats *out);
 /* Bytes held by the scene. */
 UMB_API size_t umb_scene_memory(const umb_scene *scene);
 

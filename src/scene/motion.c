@@ -176,6 +176,18 @@ umb_result umb_scene_set_motion(umb_scene *scene, uint32_t object, const umb_mot
     return result;
 }
 
+void umb_motion_shift(umb_scene *scene, const double shift[3])
+{
+    umb_movers_state *m = &scene->moving;
+    for (uint32_t i = 0; i < m->ids.used; ++i) {
+        umb_aabb *volume = &m->promises[i].def.volume;
+        if (m->objects[i] != UMB_NONE) {
+            *volume = umb_box_is_zero(volume) ? *volume : umb_scene_shift_box(volume, shift);
+            make_due(m, i, UMB_DUE_FRESH);
+        }
+    }
+}
+
 void umb_motion_remove(umb_scene *scene, const umb_object_slot *slot)
 {
     if (slot->mover != UMB_NONE) {

@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "geometry/transform.h"
 #include "scene_state.h"
 
 #define MAX_ITEMS (1u << 30) /* an index keeps two bits of an item's number for itself */
@@ -153,6 +154,9 @@ static umb_result look(const umb_scene *scene, umb_shape shape, const umb_transf
 void umb_scene_place(umb_placement *p, const umb_transform *transform, const umb_outcome *seen)
 {
     p->transform = *umb_outcome_transform(seen, transform);
+    for (int i = 0; i < 3; ++i) {
+        p->at[i] = p->transform.m[i][3];
+    }
     p->block_bounds = *seen->block_bounds;
     p->identity = seen->identity;
     p->mirrored = seen->mirrored;
@@ -213,7 +217,7 @@ void umb_scene_touch_object(umb_scene *scene, uint32_t object)
     }
 }
 
-static void touch_occluder(umb_scene *scene, uint32_t occluder)
+void umb_scene_renew_occluder(umb_scene *scene, uint32_t occluder)
 {
     if (!scene->occluders[occluder].touched) {
         scene->occluders[occluder].touched = true;
@@ -259,6 +263,21 @@ umb_result umb_scene_move_object(umb_scene *scene, uint32_t object, const umb_tr
     slot->bounds = *box;
     umb_scene_touch_object(scene, object);
     return UMB_OK;
+}
+
+umb_result umb_scene_place_object(umb_scene *scene, uint32_t object, const umb_transform *transform,
+                                  const double position[3], const umb_aabb *bounds)
+{
+    static const umb_transform identity = {{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
+    umb_transform t = transform != NULL && !umb_transform_is_identity(transform) ? *transform : identity;
+    for (int i = 0; i < 3; ++i) {
+        t.m[i][3] = (float)position[i];
+    }
+    umb_result result = umb_scene_move_object(scene, object, &t, bounds);
+    if (result == UMB_OK) {
+        memcpy(scene->objects[object].placement.at, position, 3 * sizeof position[0]);
+    }
+    return result;
 }
 
 umb_result umb_scene_flag_object(umb_scene *scene, uint32_t object, uint32_t flags)
@@ -325,7 +344,7 @@ umb_result umb_scene_add_occluder(umb_scene *scene, umb_shape shape, const umb_t
     }
     (void)umb_ids_take(&scene->occluder_ids);
     scene->occluders[id] = slot;
-    touch_occluder(scene, id);
+    umb_scene_renew_occluder(scene, id);
     *out = id;
     return UMB_OK;
 }
@@ -337,7 +356,19 @@ umb_result umb_scene_remove_occluder(umb_scene *scene, uint32_t occluder)
     }
     scene->occluders[occluder].state = UMB_SLOT_REMOVED;
     umb_ids_release(&scene->occluder_ids, occluder);
-    touch_occluder(scene, occluder);
+    umb_scene_renew_occluder(scene, occluder);
+    return UMB_OK;
+}
+
+umb_result umb_scene_open_occluder(umb_scene *scene, uint32_t occluder, bool open)
+{
+    if (occluder >= scene->occluder_ids.used || scene->occluders[occluder].state != UMB_SLOT_USED) {
+        return umb_scene_fail(scene, UMB_ERROR_ARGUMENT, "no occluder has number %u", occluder);
+    }
+    if (scene->occluders[occluder].open != open) {
+        scene->occluders[occluder].open = open;
+        umb_scene_renew_occluder(scene, occluder);
+    }
     return UMB_OK;
 }
 

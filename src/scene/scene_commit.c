@@ -152,12 +152,10 @@ static void remove_occluders(umb_scene *scene)
     }
     for (uint32_t i = 0; i < scene->touched_occluder_count; ++i) {
         umb_occluder_slot *slot = &scene->occluders[scene->touched_occluders[i]];
-        if (slot->state != UMB_SLOT_USED) {
-            if (slot->number != UMB_NONE) {
-                umb_occluders_remove(scene, slot->number);
-            }
-            slot->state = UMB_SLOT_FREE;
+        if (slot->number != UMB_NONE) { /* it may come back below */
+            umb_occluders_remove(scene, slot->number);
         }
+        slot->state = slot->state == UMB_SLOT_USED ? UMB_SLOT_USED : UMB_SLOT_FREE;
     }
 }
 
@@ -176,7 +174,7 @@ static void add_stand_alone(umb_scene *scene)
     for (uint32_t i = 0; i < scene->touched_occluder_count; ++i) {
         uint32_t id = scene->touched_occluders[i];
         umb_occluder_slot *slot = &scene->occluders[id];
-        if (slot->state == UMB_SLOT_USED && slot->number == UMB_NONE) {
+        if (slot->state == UMB_SLOT_USED && !slot->open) {
             umb_occluder made = make_occluder(scene, &slot->placement, UMB_NONE);
             umb_occluders_add_free(scene, &made, NULL, id);
         }
@@ -351,4 +349,24 @@ bool umb_scene_bounds(const umb_scene *scene, umb_aabb *out)
         any = true;
     }
     return any;
+}
+
+void umb_scene_get_stats(const umb_scene *scene, umb_scene_stats *out)
+{
+    const umb_committed *c = &scene->committed;
+    *out = (umb_scene_stats){.occluders = c->occluder_count,
+                             .stand_alone = c->occluder_count - c->first_free_occluder,
+                             .shapes = scene->shape_count,
+                             .movers = c->motion.count,
+                             .bytes = umb_scene_memory(scene)};
+    for (uint32_t i = 0; i < c->object_count; ++i) {
+        out->objects += c->objects[i].used ? 1u : 0u;
+        out->ignored += c->objects[i].used && !c->objects[i].live ? 1u : 0u;
+    }
+    for (uint32_t i = 0; i < scene->shape_count; ++i) {
+        out->triangles += scene->shapes[i]->seen_count;
+    }
+    for (uint32_t i = 0; i < scene->group_count; ++i) {
+        out->welds += scene->groups[i] != NULL ? 1u : 0u;
+    }
 }

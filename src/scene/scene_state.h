@@ -15,6 +15,7 @@ enum { UMB_SLOT_FREE = 0, UMB_SLOT_USED = 1, UMB_SLOT_REMOVED = 2 };
 /* Where a shape stands: shared by objects and hand-made occluders. */
 typedef struct umb_placement {
     umb_transform transform;
+    double at[3];          /* its translation before it was rounded to floats */
     umb_aabb block_bounds; /* of the blocking world vertices; zero when there is none */
     umb_shape shape;
     bool identity, mirrored;
@@ -34,6 +35,7 @@ typedef struct umb_occluder_slot {
     umb_placement placement;
     uint32_t number; /* of the committed occluder; UMB_NONE: there is none */
     uint8_t state;
+    bool open;    /* it hides nothing for now */
     bool touched; /* is in the list of touched occluders */
 } umb_occluder_slot;
 
@@ -155,6 +157,8 @@ void umb_occluders_add_owned(umb_scene *scene, const umb_occluder *occluder);
 void umb_occluders_add_free(umb_scene *scene, const umb_occluder *occluder, umb_weld_group *group, uint32_t index);
 void umb_occluders_remove(umb_scene *scene, uint32_t number);
 
+/* Note that a hand-made occluder changed: the commit takes it out and puts it in again. */
+void umb_scene_renew_occluder(umb_scene *scene, uint32_t occluder);
 /* Put a shape where it has been found to be. */
 void umb_scene_place(umb_placement *p, const umb_transform *transform, const umb_outcome *seen);
 
@@ -164,6 +168,10 @@ void umb_motion_commit(umb_scene *scene);
 void umb_motion_committed(umb_scene *scene);
 /* True if where the object is at the scene's time is known, though it moves. */
 bool umb_motion_is_exact(const umb_scene *scene, const umb_object_slot *slot);
+/* A box of a world whose origin moved, a little larger. */
+umb_aabb umb_scene_shift_box(const umb_aabb *b, const double shift[3]);
+/* The origin has moved: everybody is to be asked anew. */
+void umb_motion_shift(umb_scene *scene, const double shift[3]);
 /* The object of a slot is removed. */
 void umb_motion_remove(umb_scene *scene, const umb_object_slot *slot);
 void umb_motion_free(umb_scene *scene);
