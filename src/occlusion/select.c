@@ -260,7 +260,8 @@ static float slot_area(const umb_selector *s, const umb_committed *scene, uint32
         return s->node_areas[ref & UMB_REF_NUMBER];
     }
     uint32_t o = occluder_of(scene, ref);
-    return o != UMB_NONE ? s->areas[o] : 0.0f;
+    /* Areas are those of the scene's time; a view of another time may find that one is elsewhere. */
+    return o != UMB_NONE && s->areas[o] > 0.0f && !scene->occluders[o].moves ? s->areas[o] : 0.0f;
 }
 
 /* Children come after their parents; a block's after the nodes, its children before it. */
