@@ -49,7 +49,7 @@ list(FILTER UMB_COMPARE_SOURCES EXCLUDE REGEX "/compare\\.c$")
 add_library(umb_compare STATIC EXCLUDE_FROM_ALL ${UMB_COMPARE_SOURCES} bench/yardstick.c bench/yardstick_avx2.c)
 target_include_directories(umb_compare PUBLIC bench PRIVATE src tools)
 target_link_libraries(umb_compare PUBLIC ${UMB_INSIDE} PRIVATE PkgConfig::JANSSON PkgConfig::XXHASH
-                      ${EMBREE_LIBRARY} m)
+                      ${EMBREE_LIBRARY} ${CMAKE_DL_LIBS} m)
 set(UMB_RIVAL_FLAGS -O3 -fno-trapping-math -fno-signed-zeros -ffinite-math-only)
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64)$")
   list(APPEND UMB_RIVAL_FLAGS -mavx2 -mfma)

@@ -1,6 +1,6 @@
 /* The comparison: the library, its rivals and the oracle over the same views, in one run.
  *
- *     compare [--quick] [--only NAME] [--rounds N] [--docs DIR] [--out DIR]
+ *     compare [--quick] [--only NAME] [--rounds N] [--foundation FILE] [--docs DIR] [--out DIR]
  *
  * Real scenes are those of the folder that UMBRAGE_SCENES names. Exit code: 0; 1 when a configuration of
  * the library hides what can be seen, or the standard one costs more units than its limit; 2 wrong usage; 3
@@ -10,11 +10,13 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#include "foundation_entry.h"
 #include "report.h"
 
 typedef struct settings {
     bool quick;
     const char *only, *docs, *out;
+    const char *foundation; /* what scripts/foundation built: it runs over the real scenes, too */
     uint32_t rounds;
 } settings;
 
@@ -153,6 +155,10 @@ static bool one_case(const settings *s, const scene_case *sc, results *r, umb_er
     if (!world_load(&w, sc->name, sc->spec, sc->occluders, error)) {
         return false;
     }
+    if (s->foundation != NULL && (w.foundation = foundation_open(s->foundation, error)) == NULL) {
+        world_free(&w);
+        return false;
+    }
     for (uint32_t i = 0; ok && i < SETS && sc->sets[i].name != NULL && r->count < CONTESTS_MOST;
          ++i) {
         if (!s->quick || sc->sets[i].quick) {
@@ -219,6 +225,8 @@ static bool read_settings(settings *s, int argc, char **argv)
             s->quick = true;
         } else if (strcmp(argv[i], "--only") == 0 && more) {
             s->only = argv[++i];
+        } else if (strcmp(argv[i], "--foundation") == 0 && more) {
+            s->foundation = argv[++i];
         } else if (strcmp(argv[i], "--docs") == 0 && more) {
             s->docs = argv[++i];
         } else if (strcmp(argv[i], "--out") == 0 && more) {
@@ -253,7 +261,7 @@ int main(int argc, char **argv)
     umb_error error = {0};
     char machine[320];
     if (!read_settings(&s, argc, argv)) {
-        (void)fputs("compare: [--quick] [--only NAME] [--rounds N] [--docs DIR] [--out DIR]\n",
+        (void)fputs("compare: [--quick] [--only NAME] [--rounds N] [--foundation FILE] [--docs DIR] [--out DIR]\n",
                     stderr);
         return 2;
     }

@@ -3,6 +3,7 @@
 
 #include <stdlib.h>
 
+#include "foundation_entry.h"
 #include "ray_buffer.h"
 #include "zbuffer_tree.h"
 
@@ -210,6 +211,9 @@ uint32_t entries_make(const world *w, uint32_t why, entry out[ENTRIES_MOST])
         if (ray_rows[i].why & why) {
             ok = make_rays(w, &ray_rows[i], &out[count++]);
         }
+    }
+    if (ok && w->foundation != NULL && (ENTRY_SCENE & why) != 0 && foundation_entry(w, &out[count])) {
+        ++count;
     }
     if (!ok) {
         entries_free(out, count);

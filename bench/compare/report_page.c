@@ -22,6 +22,8 @@ static const char *const introduction[] = {
     "several ",
     "rounds; all contestants take turns in every round.\n\n",
     "- *umbrage*: the default method over the default index; every object hides.\n",
+    "- *foundation*: the library when it was first whole (`scripts/foundation` builds it from the ",
+    "history), with its own reader, default method and index; it knew no vertical.\n",
     "- *frustum test*: the library's strict test of boxes alone, ids in no order.\n",
     "- *z-buffer*: occluders front to back, each tested before it is drawn, per triangle at pixel ",
     "centres, in vectors of eight; then every box by rectangle and nearest depth, with a far "

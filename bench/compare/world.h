@@ -28,6 +28,7 @@ typedef struct world {
     uint32_t *indices;  /* 3 each, into vertices; no triangle is there twice */
     uint8_t *two_sided; /* per triangle */
     uint32_t triangle_count;
+    const struct foundation_interface *foundation; /* takes part too; NULL: it does not */
 } world;
 
 /* Read a scene. Objects below occluder_objects hide, for rivals (a rival is told which objects are worth
