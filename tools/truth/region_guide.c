@@ -263,7 +263,7 @@ void region_border_item(region_hand *hand, uint64_t item)
         uint64_t random = oracle_mix(oracle_mix(item, h->options->seed, 36), (uint64_t)i, h->round);
         if (other != MODEL_NONE) {
             oracle_triangle(h->t, w->object, other, u);
-            uint8_t state = h->states[h->t->first_triangle[w->object] + other];
+            uint8_t state = region_state(h, h->t->first_triangle[w->object] + other);
             if ((state & REGION_SEEN) == 0) {
                 try_neighbour(hand, w->eye, w->object, other, u, random);
             }
@@ -313,7 +313,7 @@ static void aim_at_unseen_triangle(region_hand *hand, uint64_t random)
     uint64_t count = h->t->first_triangle[object + 1] - first;
     for (uint64_t k = 0; k < 8; ++k) {
         uint64_t triangle = oracle_mix(random, k, 38) % count;
-        if ((h->states[first + triangle] & REGION_SEEN) == 0) {
+        if ((region_state(h, first + triangle) & REGION_SEEN) == 0) {
             aim_at(hand, object, (uint32_t)triangle, oracle_mix(random, k, 39));
             return;
         }

@@ -103,6 +103,9 @@ void region_cast(region_hand *hand, const double eye[3], const double through[3]
 bool region_aim(region_hand *hand, const double eye[3], const double point[3], uint32_t object,
                 uint32_t triangle);
 
+/* A triangle's state while other tasks count even rays. */
+uint8_t region_state(const region_hunt *h, uint64_t number);
+
 /* Is the find true? Fills in its witness. */
 bool region_confirm(const region_hunt *h, region_find *f);
 /* Is no line of sight from the find's eye to its object free? 1: none is; 0: not decided; -1: one is,

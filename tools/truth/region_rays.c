@@ -118,6 +118,11 @@ typedef struct shot {
     bool even;
 } shot;
 
+uint8_t region_state(const region_hunt *h, uint64_t number)
+{
+    return atomic_load_explicit((_Atomic uint8_t *)&h->states[number], memory_order_relaxed);
+}
+
 static void count_even(region_hunt *h, uint64_t number)
 {
     _Atomic uint8_t *state = (_Atomic uint8_t *)&h->states[number];
@@ -135,8 +140,7 @@ static void note(region_hand *hand, const shot *s, const oracle_hit *hit, uint8_
         return;
     }
     uint64_t number = h->t->first_triangle[hit->object] + hit->triangle;
-    uint8_t state = atomic_load_explicit((_Atomic uint8_t *)&h->states[number],
-                                         memory_order_relaxed);
+    uint8_t state = region_state(h, number);
     if (s->even) {
         count_even(h, number);
     }
