@@ -27,13 +27,13 @@ static bool is_small(void)
 /* ---- two worlds ----------------------------------------------------------------------------- */
 
 /* The town with volumes, and the one without, over several indices. */
-enum { INDICES = 3 };
+enum { INDICES = 3, METHODS = 3 };
 
 typedef struct worlds {
     moving_town town;
     umb_scene *scene, *plain;
     umb_index *index[INDICES], *plain_index;
-    umb_culler *raster[INDICES], *all[INDICES], *loose, *plain_raster, *plain_all;
+    umb_culler *raster[INDICES], *all[INDICES], *chosen[METHODS], *loose, *plain_raster, *plain_all;
 } worlds;
 
 static void set_up(worlds *w, const char *spec, const umb_allocator *allocator)
@@ -53,6 +53,12 @@ static void set_up(worlds *w, const char *spec, const umb_allocator *allocator)
     assert_int_equal(umb_index_create(w->plain, NULL, &w->plain_index), UMB_OK);
     assert_int_equal(umb_culler_create(w->plain_index, NULL, &w->plain_raster), UMB_OK);
     assert_int_equal(umb_culler_create(w->plain_index, &none, &w->plain_all), UMB_OK);
+    for (int i = 0; i < METHODS; ++i) { /* those that choose their occluders first */
+        static const umb_method methods[METHODS] = {UMB_METHOD_PLANES, UMB_METHOD_SHADOW_FRUSTA,
+                                                    UMB_METHOD_OCCLUSION_TREE};
+        umb_culler_def def = {.method = methods[i]};
+        assert_int_equal(umb_culler_create(w->index[i], &def, &w->chosen[i]), UMB_OK);
+    }
     none.unordered = true;
     assert_int_equal(umb_culler_create(w->index[0], &none, &w->loose), UMB_OK);
 }
@@ -60,6 +66,9 @@ static void set_up(worlds *w, const char *spec, const umb_allocator *allocator)
 static void tear_down(worlds *w)
 {
     umb_culler_destroy(w->loose);
+    for (int i = 0; i < METHODS; ++i) {
+        umb_culler_destroy(w->chosen[i]);
+    }
     for (int i = 0; i < INDICES; ++i) {
         umb_culler_destroy(w->raster[i]);
         umb_culler_destroy(w->all[i]);
@@ -131,12 +140,14 @@ typedef struct sums {
 /* One view: frustum culling to the bit; occlusion by the oracle. */
 static void check_view(worlds *w, const umb_view *view, bool with_oracle, sums *s)
 {
-    static const char *const names[INDICES] = {"bvh", "flat", "kdtree"};
-    umb_visible_set seen[INDICES], plain;
-    strict_answer answers[INDICES];
+    static const char *const names[INDICES + METHODS] = {"bvh",    "flat",          "kdtree",
+                                                          "planes", "shadow frusta", "occlusion tree"};
+    umb_visible_set seen[INDICES + METHODS], plain;
+    strict_answer answers[INDICES + METHODS];
     check_in_view(w, view);
-    for (int i = 0; i < INDICES; ++i) {
-        assert_int_equal(umb_cull(w->raster[i], view, &seen[i]), UMB_OK);
+    for (int i = 0; i < INDICES + METHODS; ++i) {
+        umb_culler *culler = i < INDICES ? w->raster[i] : w->chosen[i - INDICES];
+        assert_int_equal(umb_cull(culler, view, &seen[i]), UMB_OK);
         assert_int_equal(seen[i].class_, UMB_CLASS_STRICT);
         assert_int_equal(seen[i].stats.strays, 0);
         answers[i] = (strict_answer){seen[i].objects, seen[i].count, names[i], &s->strict};
@@ -154,7 +165,7 @@ static void check_view(worlds *w, const umb_view *view, bool with_oracle, sums *
         truth *oracle = truth_create(w->town.posed, &error);
         assert_non_null(oracle);
         truth_options options = {.grid_width = 160, .grid_height = 80, .guided_rays = 200000, .threads = 1};
-        assert_true(strict_check_all(oracle, w->town.posed, view, answers, INDICES, &options));
+        assert_true(strict_check_all(oracle, w->town.posed, view, answers, INDICES + METHODS, &options));
         truth_destroy(oracle);
     }
 }
