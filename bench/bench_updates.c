@@ -2,7 +2,7 @@
  * the commit (scene and index) and for the cull after it, beside an index that is built anew each frame; objects that
  * come and go; and what a frame costs in ever larger scenes of which the same number of objects is visible.
  *
- *     bench_updates [most objects] [seconds for each figure] [index]
+ *     bench_updates [most objects] [seconds for each figure] [index] [motion|changes|scaling]
  *
  * Lines of comma-separated values; scripts/updates-report makes docs/results/updates.md of them. Ratios are within one
  * run, times the processor's, of this thread.
@@ -252,6 +252,10 @@ static void bench_changes(uint32_t count, const umb_index_def *kind, double seco
         must(umb_index_create(s.scene, kind, &index));
         double sum = 0.0, worst = 0.0, begun = now();
         uint32_t frames = 0;
+        for (int f = 0; f < 4; ++f) { /* the first ones make room */
+            exchange(&s, changes);
+            must(umb_scene_commit(s.scene));
+        }
         for (; frames < 200 && (frames < 8 || now() - begun < seconds); ++frames) {
             exchange(&s, changes);
             double start = now();
@@ -396,25 +400,47 @@ static void bench_scaling(uint32_t most, double seconds)
     }
 }
 
+static void bench_all_motion(uint32_t most, const umb_index_def *def, double seconds)
+{
+    printf("motion,spread,objects,moving_percent,way,update_ms,cull_ms,worst_update_ms,found,megabytes,frames,"
+           "times_faster\n");
+    for (uint32_t count = 1000; count <= most; count *= 10) {
+        bench_motion(count, false, def, seconds);
+        bench_motion(count, true, def, seconds);
+    }
+}
+
+static void bench_all_changes(uint32_t most, const umb_index_def *def, double seconds)
+{
+    printf("changes,objects,each_way,commit_ms,worst_ms,microseconds_each,rebuild_ms,cost_over_new\n");
+    for (uint32_t count = 1000; count <= most; count *= 10) {
+        bench_changes(count, def, seconds);
+    }
+}
+
 int main(int argc, char **argv)
 {
     uint32_t most = argc > 1 ? (uint32_t)strtoul(argv[1], NULL, 10) : 1000000;
     double seconds = argc > 2 ? strtod(argv[2], NULL) : 4.0;
+    const char *part = argc > 4 ? argv[4] : "";
     umb_index_def def = {0};
-    if (most < 1000 || !(seconds > 0.0) || (argc > 3 && !umb_index_parse(argv[3], &def))) {
-        fprintf(stderr, "usage: bench_updates [most objects, from 1000] [seconds for each figure] [index]\n");
+    bool all = part[0] == '\0', motion = all || strcmp(part, "motion") == 0, changes = all || strcmp(part, "changes") == 0;
+    bool scaling = all || strcmp(part, "scaling") == 0;
+    if (most < 1000 || !(seconds > 0.0) || (argc > 3 && !umb_index_parse(argv[3], &def)) ||
+        !(motion || changes || scaling)) {
+        fprintf(stderr, "usage: bench_updates [most objects, from 1000] [seconds for each figure] [index] "
+                        "[motion|changes|scaling]\n");
         return 2;
     }
-    printf("motion,spread,objects,moving_percent,way,update_ms,cull_ms,worst_update_ms,found,megabytes,frames,times_faster\n");
-    for (uint32_t count = 1000; count <= most; count *= 10) {
-        bench_motion(count, false, &def, seconds);
-        bench_motion(count, true, &def, seconds);
+    if (motion) {
+        bench_all_motion(most, &def, seconds);
     }
-    printf("changes,objects,each_way,commit_ms,worst_ms,microseconds_each,rebuild_ms,cost_over_new\n");
-    for (uint32_t count = 1000; count <= most; count *= 10) {
-        bench_changes(count, &def, seconds);
+    if (changes) {
+        bench_all_changes(most, &def, seconds);
     }
-    printf("scaling,behind,visible,still_cull_ms,moving_cull_ms,moving_commit_ms\n");
-    bench_scaling(most, seconds);
+    if (scaling) {
+        printf("scaling,behind,visible,still_cull_ms,moving_cull_ms,moving_commit_ms\n");
+        bench_scaling(most, seconds);
+    }
     return 0;
 }
