@@ -418,6 +418,7 @@ static void test_determinism(void **state)
     assert_true(hash_spec("gen:city,triangles=50k,seed=7") == UINT64_C(0x25f6284dd9b67099));
     assert_true(hash_spec("gen:boxfield,polygons=20k") == UINT64_C(0x9eddb427f6546bed));
     assert_true(hash_spec("gen:building") == UINT64_C(0x308e5f275936a6d));
+    assert_true(hash_spec("gen:sodacity,blocks=2,floors=2,rooms=6") == UINT64_C(0xe68911493392737d));
     assert_true(hash_spec("gen:city,triangles=50k,seed=8") !=
                 hash_spec("gen:city,triangles=50k,seed=7"));
 }

@@ -50,10 +50,15 @@ typedef enum umb_coherence {
     /* An occluder that covered nothing new when it was last drawn rests for 1, 2, 4, then 8 frames, as long as its
        image stays much where and what it was; convex ones, which are cheap, do not. May report more.
        UMB_METHOD_PLANES and UMB_METHOD_SHADOW_FRUSTA: one that was chosen and hid nothing, convex or not, makes room
-       for others as long. Methods that choose their occluders first know no other switch, but for
-       UMB_COHERENCE_LIST with UMB_METHOD_SHADOW_FRUSTA: those that hid most in the last frame are chosen first. */
+       for others as long. Methods that choose their occluders first know no other switch but
+       the next one, and UMB_COHERENCE_LIST with UMB_METHOD_SHADOW_FRUSTA: those that hid most in the last frame are
+       chosen first. */
     UMB_COHERENCE_REST = 1u << 4,
-    UMB_COHERENCE_ALL = (1u << 5) - 1
+    /* UMB_METHOD_PLANES: tangent planes of occluders' edges and boxes are kept at the nodes, 19 MB of them, and used
+       again when the eye has moved (Coorg and Teller 3.3); without, planes through the eye are made in each frame,
+       which costs less (docs/results/planes.md). Answers are the same. */
+    UMB_COHERENCE_PLANES = 1u << 5,
+    UMB_COHERENCE_ALL = (1u << 6) - 1
 } umb_coherence;
 
 typedef struct umb_culler_def {

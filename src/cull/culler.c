@@ -115,7 +115,7 @@ umb_result umb_culler_create(const umb_index *index, const umb_culler_def *def, 
     c->kernels = kernels;
     c->ops = umb_method_get(def->method);
     if (c->ops != NULL && !chooses(c)) { /* without occlusion there is nothing to learn */
-        c->past.switches = def->coherence;
+        c->past.switches = def->coherence & ~(uint32_t)UMB_COHERENCE_PLANES;
         c->past.budget = def->occluder_budget;
     }
     if (c->ops != NULL && c->ops->create(allocator, def->isa, &c->method) != UMB_OK) {
@@ -997,6 +997,11 @@ const umb_index *umb_culler_index(const umb_culler *culler)
 const umb_coverage *umb_culler_coverage(const umb_culler *culler)
 {
     return culler->ops != NULL && culler->ops->buffer != NULL && culler->answered ? culler->ops->buffer(culler->method) : NULL;
+}
+
+void *umb_culler_method_state(const umb_culler *culler)
+{
+    return culler->method;
 }
 
 umb_culler_def umb_culler_settings(const umb_culler *culler)

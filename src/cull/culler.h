@@ -12,5 +12,7 @@ umb_culler_def umb_culler_settings(const umb_culler *culler);
 const umb_view *umb_culler_last_view(const umb_culler *culler, const uint32_t **ids, uint32_t *count);
 /* The method's buffer as the last umb_cull left it, or NULL. */
 const umb_coverage *umb_culler_coverage(const umb_culler *culler);
+/* The method's own state, for measurements; NULL: it has none. */
+void *umb_culler_method_state(const umb_culler *culler);
 
 #endif

@@ -137,6 +137,7 @@ static bool add_edge(maker *m, const umb_facet *f, uint32_t corner)
     vertex(m, to, runs_back(m) ? e->a : e->b);
     e->beyond = UMB_NONE;
     e->facet = facets->beyond[f->first + corner];
+    e->id = (uint64_t)m->def->occluder << 32 | (f->first + corner) << 1 | (m->blocker.flipped ? 1u : 0u);
     m->blocker.edge_count += 1;
     for (uint32_t i = 0; i < b->viewer.point_count; ++i) {
         umb_sight s = umb_sight_past(&b->viewer, i, e->a, e->b);

@@ -31,6 +31,7 @@ typedef struct umb_blocker_edge {
     float a[3], b[3];
     uint32_t beyond; /* the blocker across it, or UMB_NONE */
     uint32_t facet;  /* the facet across it, or UMB_NONE */
+    uint64_t id;     /* the same in every frame, and no other edge's, as long as the scene's structure lasts */
 } umb_blocker_edge;
 
 /* Beyond the surface: n . (x - origin) < low, in doubles. */

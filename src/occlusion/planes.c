@@ -10,6 +10,7 @@
 
 #include <string.h>
 
+#include "planes_cache.h"
 #include "select.h"
 
 #define CHOSEN 64
@@ -41,6 +42,9 @@ typedef struct planes {
     uint32_t seen_count;
     size_t arena_capacity, hidden_capacity, seen_of_capacity, seen_capacity;
     uint32_t arena_top;
+    umb_planes_way way, wanted_way;
+    umb_planes_cache cache;
+    float eye[4]; /* for tangent planes */
 } planes;
 
 static umb_result create(const umb_allocator *allocator, umb_isa isa, void **state)
@@ -63,6 +67,7 @@ static void destroy(void *state)
     umb_allocator a = p->allocator;
     umb_selector_free(&p->selector);
     umb_blockers_free(&p->blockers, &a);
+    umb_planes_cache_free(&p->cache, &a);
     umb_memory_free(&a, p->arena, p->arena_capacity * sizeof *p->arena);
     umb_memory_free(&a, p->hidden, p->hidden_capacity * sizeof *p->hidden);
     umb_memory_free(&a, p->seen_of, p->seen_of_capacity * sizeof *p->seen_of);
@@ -88,6 +93,33 @@ static void tell_selector(planes *p)
     }
 }
 
+/* How this frame compares boxes and edges. A cell's planes are only found directly. */
+static bool choose_way(planes *p, const umb_choice *choice)
+{
+    const umb_viewer *v = &choice->viewer;
+    bool keeps = (choice->coherence & UMB_COHERENCE_PLANES) != 0;
+    p->way = p->wanted_way != UMB_PLANES_DEFAULT ? p->wanted_way : keeps ? UMB_PLANES_CACHED : UMB_PLANES_DIRECT;
+    p->way = v->point_count == 1 ? p->way : UMB_PLANES_DIRECT;
+    for (int i = 0; i < 3; ++i) {
+        p->eye[i] = (float)(v->parallel ? -v->points[0][i] : v->points[0][i]);
+    }
+    p->eye[3] = v->parallel ? 0.0f : 1.0f;
+    return p->way == UMB_PLANES_DIRECT ||
+           umb_planes_cache_begin(&p->cache, &p->allocator, choice->scene->version, p->way == UMB_PLANES_CACHED);
+}
+
+void umb_planes_go(void *state, umb_planes_way way)
+{
+    ((planes *)state)->wanted_way = way;
+}
+
+void umb_planes_count(const void *state, uint64_t *kept, uint64_t *made)
+{
+    const planes *p = state;
+    *kept = p->cache.kept;
+    *made = p->cache.made;
+}
+
 static umb_result choose(void *state, const umb_choice *choice)
 {
     planes *p = state;
@@ -99,7 +131,7 @@ static umb_result choose(void *state, const umb_choice *choice)
     }
     p->choice = choice;
     p->blockers.count = 0;
-    if (!reserve(p, wanted) || !umb_blockers_begin(&p->blockers, &p->allocator, &choice->viewer, wanted)) {
+    if (!choose_way(p, choice) || !reserve(p, wanted) || !umb_blockers_begin(&p->blockers, &p->allocator, &choice->viewer, wanted)) {
         return UMB_ERROR_MEMORY;
     }
     umb_result result = umb_select_begin(&p->selector, choice, p->box_kernels);
@@ -191,6 +223,42 @@ static uint32_t see_planes(const planes *p, const umb_node *boxes, const umb_blo
         behind &= sides[k->plane_count + i].in;
     }
     return behind;
+}
+
+/* The same by tangent planes, of boxes beyond the surface: they have them. */
+static uint32_t see_tangents(planes *p, const umb_query *q, const umb_blocker *k, uint32_t behind, seen *out)
+{
+    uint32_t gone = 0;
+    for (uint32_t e = 0; e < k->edge_count; ++e) {
+        const umb_blocker_edge *edge = &p->blockers.edges[k->first_edge + e];
+        uint32_t asked = behind & ~gone;
+        umb_sides s = {0, 0, 0, 0};
+        if (asked != 0) {
+            s = p->kernels->tangent_sides(umb_planes_cache_get(&p->cache, q->node, q->boxes, edge, asked), p->eye);
+            decide_edge(p, q->boxes, edge, asked, &s);
+        }
+        out->in[e] = s.in;
+        gone |= s.out & asked;
+    }
+    return gone;
+}
+
+static bool look_by_tangents(planes *p, const umb_query *q, const umb_near_boxes *boxes, uint32_t blocker, seen *out)
+{
+    const umb_blocker *k = &p->blockers.list[blocker];
+    umb_sides sides[2 * UMB_BLOCKER_PLANES];
+    uint32_t count = k->plane_count + k->near_count, front = 0;
+    p->kernels->sides(boxes, &p->blockers.spaces[k->first_space + k->edge_count], count, 0, q->mask, sides);
+    uint32_t behind = see_planes(p, q->boxes, k, sides, q->mask, &front) & ~front;
+    uint32_t gone = see_tangents(p, q, k, behind, out), full = behind & ~gone;
+    for (uint32_t e = 0; e < k->edge_count; ++e) {
+        full &= out->in[e];
+    }
+    out->blocker = (uint16_t)blocker;
+    out->alive = (uint8_t)(q->mask & ~gone & ~front);
+    out->behind = (uint8_t)(behind & ~gone);
+    out->full = (uint8_t)full;
+    return out->alive != 0;
 }
 
 /* False if the blocker hides nothing of any box. */
@@ -303,7 +371,9 @@ static void ask(void *state, umb_query *q)
     p->choice->stats->tests += list[0];
     for (uint32_t i = 0; i < list[0] && (q->mask & ~hidden) != 0; ++i) {
         seen *s = &p->seen[p->seen_count];
-        if (!look(p, q, &boxes, list[1 + i], s)) {
+        bool part = p->way == UMB_PLANES_DIRECT ? look(p, q, &boxes, list[1 + i], s)
+                                                : look_by_tangents(p, q, &boxes, list[1 + i], s);
+        if (!part) {
             continue;
         }
         p->seen_of[s->blocker] = (uint16_t)p->seen_count++;

@@ -16,12 +16,24 @@ typedef struct umb_sides {
     uint8_t in, open, out, part;
 } umb_sides;
 
+/* Tangent planes of an edge and eight boxes (tangent.h), n . x = offset: all of a box is past the edge on the occluder's
+ * side where n . p > offset at the viewpoint p for the supporting plane, some of it where it is so for the separating
+ * one. */
+typedef struct umb_edge_planes {
+    float supporting[4][UMB_NODE_WIDTH], separating[4][UMB_NODE_WIDTH];
+    float size;     /* at least the sum of |x| of a point of the edge */
+    uint8_t known;  /* boxes whose planes are there */
+    uint8_t unsure; /* of these, those whose planes doubles could not tell */
+} umb_edge_planes;
+
 typedef struct umb_planes_kernels {
     umb_isa isa;
     void (*place)(const umb_node *node, const float high[3], const float low[3], umb_near_boxes *out);
     /* Stops where all boxes of the mask are out of half-spaces before `may_stop`; returns how many were looked at. */
     uint32_t (*sides)(const umb_near_boxes *boxes, const umb_half_space *spaces, uint32_t count, uint32_t may_stop,
                       uint32_t mask, umb_sides *out);
+    /* p: the viewpoint and 1, or where it lies in a direction and 0. */
+    umb_sides (*tangent_sides)(const umb_edge_planes *planes, const float p[4]);
 } umb_planes_kernels;
 
 /* NULL when the set is not available. All of them give the same bits. */

@@ -59,4 +59,29 @@ static uint32_t sides(const umb_near_boxes *boxes, const umb_half_space *spaces,
     return count;
 }
 
-const umb_planes_kernels KERNELS = {ISA, place, sides};
+UMB_INLINE umb_fv plane_value(const float planes[4][LANES], const float p[4], int at)
+{
+    umb_fv value = umb_fv_load(planes[0] + at) * p[0] + umb_fv_load(planes[1] + at) * p[1];
+    return (value + umb_fv_load(planes[2] + at) * p[2]) - umb_fv_load(planes[3] + at) * p[3];
+}
+
+static umb_sides tangent_sides(const umb_edge_planes *planes, const float p[4])
+{
+    umb_sides sides = {0, 0, 0, 0};
+    umb_fv near = umb_fv_abs(umb_fv_set(p[0])) + umb_fv_abs(umb_fv_set(p[1])) + umb_fv_abs(umb_fv_set(p[2]));
+    umb_fv bound = 0x1p-20f * (near + p[3] * planes->size);
+    for (int at = 0; at < LANES; at += UMB_LANES) {
+        umb_fv all = plane_value(planes->supporting, p, at), some = plane_value(planes->separating, p, at);
+        sides.in |= (uint8_t)(umb_iv_bits(all > bound) << at);
+        sides.open |= (uint8_t)(umb_iv_bits(all < -bound) << at);
+        sides.out |= (uint8_t)(umb_iv_bits(some < -bound) << at);
+        sides.part |= (uint8_t)(umb_iv_bits(some > bound) << at);
+    }
+    sides.in &= (uint8_t)~planes->unsure;
+    sides.open &= (uint8_t)~planes->unsure;
+    sides.out &= (uint8_t)~planes->unsure;
+    sides.part &= (uint8_t)~planes->unsure;
+    return sides;
+}
+
+const umb_planes_kernels KERNELS = {ISA, place, sides, tangent_sides};

@@ -8,7 +8,7 @@
 #include "model_parts.h"
 
 static const generate_kind *const kinds[] = {&generate_blocks, &generate_city, &generate_boxfield,
-                                             &generate_building};
+                                             &generate_building, &generate_sodacity};
 enum { KIND_COUNT = sizeof kinds / sizeof kinds[0] };
 
 /* What a spec says, ready to be run. */

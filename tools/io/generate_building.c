@@ -10,7 +10,9 @@
  *   +---+-------+------+-----+        neighbours share their end faces to the bit.
  *
  * Rooms have one door to their corridor (some closed), some a door to the next room, few a
- * window. */
+ * window.
+ *
+ * `sodacity`: blocks by blocks of such buildings, each with a plan of its own, and streets between. */
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -24,6 +26,7 @@
 #define EYE_HEIGHT 1.7
 #define DOOR_TOP 2.25
 #define DOOR_WIDTH 1.0
+#define STREET 12.0
 
 enum { ROOMS_IN_ROW = 12, MAX_COLUMNS = ROOMS_IN_ROW + 1, MAX_ROWS = 256, VIEWS = 72 };
 enum { PANEL_NONE, PANEL_SOLID, PANEL_DOOR, PANEL_CLOSED, PANEL_WINDOW };
@@ -53,7 +56,8 @@ typedef struct building_maker {
     building_shape *shapes; /* panels made so far, to be shared */
     uint32_t shape_count;
     uint32_t cube, post, furniture[FURNITURE];
-    char place[40];
+    char place[64];
+    double x, z; /* where the building's corner is */
     bool failed;
 } building_maker;
 
@@ -184,9 +188,12 @@ static uint32_t panel_mesh(building_maker *b, const building_panel *p)
 
 static void put(building_maker *b, const char *what, uint32_t mesh, const umb_transform *t)
 {
-    char name[80];
+    char name[96];
+    umb_transform at = *t;
+    at.m[0][3] += (float)b->x;
+    at.m[2][3] += (float)b->z;
     snprintf(name, sizeof name, "%s %s", b->place, what);
-    if (mesh == MODEL_NONE || model_add_object(b->m, name, mesh, t) == MODEL_NONE) {
+    if (mesh == MODEL_NONE || model_add_object(b->m, name, mesh, &at) == MODEL_NONE) {
         b->failed = true;
     }
 }
@@ -325,7 +332,11 @@ static void put_cell(building_maker *b, uint32_t floor, uint32_t column, uint32_
 {
     const building_plan *p = b->plan;
     bool column_in = column < p->columns, row_in = row < p->rows;
-    snprintf(b->place, sizeof b->place, "floor %u cell %u,%u", floor, column, row);
+    if (b->x != 0.0 || b->z != 0.0) {
+        snprintf(b->place, sizeof b->place, "at %g,%g floor %u cell %u,%u", b->x, b->z, floor, column, row);
+    } else {
+        snprintf(b->place, sizeof b->place, "floor %u cell %u,%u", floor, column, row);
+    }
     if (column_in && row_in) {
         put_slab(b, floor, column, row);
     }
@@ -345,19 +356,24 @@ static void put_cell(building_maker *b, uint32_t floor, uint32_t column, uint32_
     }
 }
 
+static void put_building(building_maker *b)
+{
+    for (uint32_t floor = 0; floor <= b->plan->floors && !b->failed; ++floor) {
+        for (uint32_t row = 0; row <= b->plan->rows; ++row) {
+            for (uint32_t column = 0; column <= b->plan->columns && !b->failed; ++column) {
+                put_cell(b, floor, column, row);
+            }
+        }
+    }
+}
+
 static bool building_model(const uint64_t *values, model *m)
 {
     building_plan plan;
     building_maker b = {.plan = &plan, .m = m};
     lay_out(values, &plan);
     b.failed = !make_shapes(&b);
-    for (uint32_t floor = 0; floor <= plan.floors && !b.failed; ++floor) {
-        for (uint32_t row = 0; row <= plan.rows; ++row) {
-            for (uint32_t column = 0; column <= plan.columns && !b.failed; ++column) {
-                put_cell(&b, floor, column, row);
-            }
-        }
-    }
+    put_building(&b);
     free(b.shapes);
     generate_mesh_free(&b.mesh);
     return !b.failed;
@@ -400,3 +416,63 @@ const generate_kind generate_building = {
     {{"floors", 4, 1, 200}, {"rooms", 24, 2, 2000}, {"seed", 1, 0, UINT32_MAX}},
     building_model,
     building_path};
+
+/* The plan of a building of the city, and where its corner is: all stand on one square grid. */
+static void lay_out_block(const uint64_t *values, uint32_t block, building_plan *p, double at[2])
+{
+    const uint64_t one[3] = {values[1], values[2], values[3] + 7919u * (uint64_t)block};
+    lay_out(one, p);
+    double x = WALL + CROSS + (p->columns - 1) * (WALL + 6.0) + WALL, z = p->rows * (WALL + 6.0) + WALL;
+    double pitch = (x > z ? x : z) + STREET;
+    at[0] = pitch * (double)(block % values[0]);
+    at[1] = pitch * (double)(block / values[0]);
+}
+
+static bool city_model(const uint64_t *values, model *m)
+{
+    building_plan plan;
+    building_maker b = {.plan = &plan, .m = m};
+    b.failed = !make_shapes(&b);
+    for (uint32_t block = 0; block < values[0] * values[0] && !b.failed; ++block) {
+        double at[2];
+        lay_out_block(values, block, &plan, at);
+        b.x = at[0];
+        b.z = at[1];
+        put_building(&b);
+    }
+    free(b.shapes);
+    generate_mesh_free(&b.mesh);
+    return !b.failed;
+}
+
+/* By turns from inside of a building and along a street. */
+static bool city_path(const uint64_t *values, camera_path *out)
+{
+    generate_random r = generate_stream(values[3], -1, -2);
+    for (uint32_t v = 0; v < VIEWS / 3; ++v) {
+        building_plan p;
+        double at[2], eye[3], target[3];
+        lay_out_block(values, generate_below(&r, (uint32_t)(values[0] * values[0])), &p, at);
+        uint32_t floor = generate_below(&r, p.floors), corridor = 3 * generate_below(&r, p.rows / 3) + 1;
+        eye[0] = at[0] + WALL + (p.x[p.columns] - WALL) * (0.1 + 0.8 * generate_unit(&r));
+        eye[1] = floor * STOREY + SLAB + EYE_HEIGHT;
+        eye[2] = at[1] + p.z[corridor] + WALL + CORRIDOR / 2;
+        target[0] = eye[0] + (v % 2 == 0 ? 20.0 : -20.0);
+        target[1] = eye[1];
+        target[2] = eye[2] + 2.0 * generate_unit(&r) - 1.0;
+        double street[3] = {at[0] - STREET / 2, SLAB + EYE_HEIGHT, at[1] + 40.0 * generate_unit(&r)};
+        double down[3] = {street[0] + 6.0 * generate_unit(&r), street[1], street[2] + 30.0};
+        double across[3] = {street[0] + 30.0, street[1] + 2.0, street[2] + 20.0 * generate_unit(&r)};
+        if (!generate_look(out, eye, target) || !generate_look(out, street, down) ||
+            !generate_look(out, street, across)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+const generate_kind generate_sodacity = {
+    "sodacity",
+    {{"blocks", 3, 1, 40}, {"floors", 4, 1, 200}, {"rooms", 24, 2, 2000}, {"seed", 1, 0, UINT32_MAX}},
+    city_model,
+    city_path};

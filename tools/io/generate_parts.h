@@ -24,7 +24,7 @@ typedef struct generate_kind {
     bool (*path)(const uint64_t *values, camera_path *out);
 } generate_kind;
 
-extern const generate_kind generate_blocks, generate_city, generate_boxfield, generate_building;
+extern const generate_kind generate_blocks, generate_city, generate_boxfield, generate_building, generate_sodacity;
 
 /* splitmix64 (Steele, Lea and Flood 2014). */
 typedef struct generate_random {
