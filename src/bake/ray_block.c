@@ -316,7 +316,7 @@ static umb_umbra_summary reach_of(const band *d, bool floor, const float span[2]
 static void draw_run(band *d, uint32_t group, uint32_t from, uint32_t to)
 {
     umb_ray_map *m = d->map;
-    uint32_t groups = m->tiles / UMB_TILE;
+    uint32_t groups = m->columns / UMB_TILE;
     const float *span = m->spans[d->row * groups + group];
     double t0 = m->t0 + from * UMB_TILE * m->dt, t1 = m->t0 + (to + 1) * UMB_TILE * m->dt;
     if (!d->blocker->convex) {
@@ -333,7 +333,7 @@ static void draw_run(band *d, uint32_t group, uint32_t from, uint32_t to)
     bool wanted[UMB_TILE];
     uint32_t first = UMB_NONE, last = 0;
     for (uint32_t j = from; j <= to; ++j) {
-        const umb_umbra_summary *s = &m->summaries[d->row * m->tiles + j];
+        const umb_umbra_summary *s = &m->summaries[d->row * m->columns + j];
         wanted[j - group * UMB_TILE] = !(s->top >= reach.top && s->bottom <= reach.bottom);
         if (wanted[j - group * UMB_TILE]) {
             first = first == UMB_NONE ? j : first;
@@ -345,7 +345,7 @@ static void draw_run(band *d, uint32_t group, uint32_t from, uint32_t to)
     }
     umb_umbra_draw draw = {.umbra = &d->umbra, .umbrae = m->umbrae, .half = d->half, .tile_count = last - first + 1};
     for (uint32_t j = first; j <= last; ++j) {
-        uint32_t tile = d->row * m->tiles + j;
+        uint32_t tile = d->row * m->columns + j;
         if (!wanted[j - group * UMB_TILE]) {
             continue;
         }
@@ -359,7 +359,7 @@ static void draw_run(band *d, uint32_t group, uint32_t from, uint32_t to)
     d->kernels->draw(&draw);
     for (uint32_t j = first; j <= last; ++j) {
         if (draw.tiles[j - first] != NULL) {
-            m->summaries[d->row * m->tiles + j] = draw.summaries[j - first];
+            m->summaries[d->row * m->columns + j] = draw.summaries[j - first];
         }
     }
     m->stale[(d->row / UMB_TILE) * groups + group] = true;
@@ -375,14 +375,14 @@ static bool range_of_tiles(const band *d, uint32_t *from, uint32_t *to)
         double alpha = m->alpha0 + m->alpha1 * p->u, beta = m->beta0 + m->beta1 * p->u;
         if (!(beta > 1e-9 * (fabs(m->beta0) + fabs(m->beta1 * p->u)))) {
             *from = 0;
-            *to = m->tiles - 1;
+            *to = m->columns - 1;
             return true;
         }
         double a = (p->v - alpha * d->s) / beta, b = (p->v - alpha * (d->s + UMB_TILE * m->ds)) / beta;
         least = fmin(least, fmin(a, b));
         most = fmax(most, fmax(a, b));
     }
-    double first = fmax(0.0, floor((least - m->t0) / width)), last = fmin(m->tiles - 1.0, floor((most - m->t0) / width));
+    double first = fmax(0.0, floor((least - m->t0) / width)), last = fmin(m->columns - 1.0, floor((most - m->t0) / width));
     if (!(first <= last)) {
         return false;
     }
@@ -394,13 +394,18 @@ static bool range_of_tiles(const band *d, uint32_t *from, uint32_t *to)
 void umb_ray_map_block(umb_ray_map *map, const umb_umbra_kernels *kernels, const umb_ray_blocker *b, bool half)
 {
     band d = {.map = map, .kernels = kernels, .blocker = b, .half = half};
-    for (d.row = 0; d.row < map->tiles; ++d.row) {
+    bool near = true;
+    for (uint32_t i = 0; i < b->count; ++i) {
+        near = (i > 0 && near) || b->vertices[i].u < 16.0 * (map->frame->hu + map->frame->hv);
+    }
+    for (d.row = 0; d.row < map->rows; ++d.row) {
         uint32_t from, to;
         d.s = map->s0 + d.row * UMB_TILE * map->ds;
         if (!range_of_tiles(&d, &from, &to)) {
             continue;
         }
-        if (b->convex) {
+        /* Far away the chains are the same from row to row; any would be right. */
+        if (b->convex && (near || d.row % UMB_TILE == 0 || d.top_count == 0)) {
             convex_chains(&d);
         }
         for (uint32_t g = from / UMB_TILE; g <= to / UMB_TILE; ++g) {

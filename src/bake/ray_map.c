@@ -15,17 +15,18 @@ umb_ray_point umb_ray_frame_point(const umb_ray_frame *f, const double p[3])
 
 /* ---- setting up ----------------------------------------------------------------------------- */
 
-static void choose_rays(umb_ray_map *m, umb_ray_kind kind, double outer, uint32_t resolution)
+static void choose_rays(umb_ray_map *m, umb_ray_kind kind, double outer)
 {
     const umb_ray_frame *f = m->frame;
+    uint32_t rows = m->rows * UMB_TILE, columns = m->columns * UMB_TILE;
     if (kind == UMB_RAY_SLAB) {
         double reach = f->hv + f->hu;
         m->alpha0 = m->beta1 = 1.0;
         m->alpha1 = m->beta0 = 0.0;
         m->s0 = -reach;
         m->t0 = -1.0;
-        m->ds = 2.0 * reach / resolution;
-        m->dt = 2.0 / resolution;
+        m->ds = 2.0 * reach / rows;
+        m->dt = 2.0 / columns;
         return;
     }
     double ui = kind == UMB_RAY_NEAR ? f->hu : -f->hu, uo = outer * f->hu;
@@ -35,8 +36,8 @@ static void choose_rays(umb_ray_map *m, umb_ray_kind kind, double outer, uint32_
     m->alpha0 = uo * m->beta1;
     m->s0 = -f->hv;
     m->t0 = -outer * f->hv;
-    m->ds = 2.0 * f->hv / resolution;
-    m->dt = 2.0 * outer * f->hv / resolution;
+    m->ds = 2.0 * f->hv / rows;
+    m->dt = 2.0 * outer * f->hv / columns;
 }
 
 /* True if no ray of the rectangle has to be looked at here: it misses the cell, or it is in the other map. */
@@ -109,9 +110,9 @@ static size_t place(size_t *bytes, size_t count, size_t size)
     return at;
 }
 
-static map_layout lay_out(uint32_t side, uint32_t umbrae)
+static map_layout lay_out(uint32_t rows, uint32_t columns, uint32_t umbrae)
 {
-    size_t tiles = (size_t)side * side, groups = tiles / (UMB_TILE * UMB_TILE);
+    size_t tiles = (size_t)rows * columns, groups = tiles / (UMB_TILE * UMB_TILE);
     map_layout l = {0};
     l.intervals = place(&l.bytes, tiles * umbrae, sizeof(umb_umbra_tile));
     l.summaries = place(&l.bytes, tiles, sizeof(umb_umbra_summary));
@@ -119,15 +120,16 @@ static map_layout lay_out(uint32_t side, uint32_t umbrae)
     l.live = place(&l.bytes, tiles, sizeof(uint64_t));
     l.drawn = place(&l.bytes, tiles, sizeof(bool));
     l.stale = place(&l.bytes, groups, sizeof(bool));
-    l.spans = place(&l.bytes, (size_t)side * side / UMB_TILE, 2 * sizeof(float));
+    l.spans = place(&l.bytes, tiles / UMB_TILE, 2 * sizeof(float));
     return l;
 }
 
 umb_result umb_ray_map_begin(umb_ray_map *map, const umb_allocator *a, const umb_ray_frame *frame,
                              umb_ray_kind kind, double outer, uint32_t resolution, uint32_t umbrae)
 {
-    uint32_t side = resolution / UMB_TILE;
-    map_layout l = lay_out(side, umbrae);
+    uint32_t columns = resolution / UMB_TILE, least = UMB_TILE;
+    uint32_t rows = kind != UMB_RAY_SLAB ? columns : (columns / 4 + least - 1) / least * least;
+    map_layout l = lay_out(rows, columns, umbrae);
     char *block = (char *)map->intervals;
     if (map->bytes != l.bytes) {
         umb_ray_map_free(map, a);
@@ -136,7 +138,7 @@ umb_result umb_ray_map_begin(umb_ray_map *map, const umb_allocator *a, const umb
             return UMB_ERROR_MEMORY;
         }
     }
-    *map = (umb_ray_map){.frame = frame, .tiles = side, .umbrae = umbrae, .bytes = l.bytes};
+    *map = (umb_ray_map){.frame = frame, .rows = rows, .columns = columns, .umbrae = umbrae, .bytes = l.bytes};
     map->intervals = (umb_umbra_tile *)(void *)(block + l.intervals);
     map->summaries = (umb_umbra_summary *)(void *)(block + l.summaries);
     map->groups = (umb_umbra_summary *)(void *)(block + l.groups);
@@ -144,20 +146,20 @@ umb_result umb_ray_map_begin(umb_ray_map *map, const umb_allocator *a, const umb
     map->drawn = (bool *)(block + l.drawn);
     map->stale = (bool *)(block + l.stale);
     map->spans = (float(*)[2])(void *)(block + l.spans);
-    choose_rays(map, kind, outer, resolution);
-    for (uint32_t i = 0; i < side; ++i) {
-        for (uint32_t j = 0; j < side; ++j) {
-            map->live[i * side + j] = live_pixels(map, kind, outer, i, j);
-            map->summaries[i * side + j] = map->live[i * side + j] != 0
+    choose_rays(map, kind, outer);
+    for (uint32_t i = 0; i < rows; ++i) {
+        for (uint32_t j = 0; j < columns; ++j) {
+            map->live[i * columns + j] = live_pixels(map, kind, outer, i, j);
+            map->summaries[i * columns + j] = map->live[i * columns + j] != 0
                                                ? (umb_umbra_summary){-INFINITY, INFINITY, INFINITY}
                                                : (umb_umbra_summary){INFINITY, -INFINITY, -INFINITY};
         }
-        for (uint32_t g = 0; g < side / UMB_TILE; ++g) {
-            find_span(map, i, g, map->spans[i * (side / UMB_TILE) + g]);
+        for (uint32_t g = 0; g < columns / UMB_TILE; ++g) {
+            find_span(map, i, g, map->spans[i * (columns / UMB_TILE) + g]);
         }
     }
-    memset(map->drawn, 0, (size_t)side * side * sizeof *map->drawn);
-    memset(map->stale, 1, (size_t)side * side / (UMB_TILE * UMB_TILE) * sizeof *map->stale);
+    memset(map->drawn, 0, (size_t)rows * columns * sizeof *map->drawn);
+    memset(map->stale, 1, (size_t)rows * columns / (UMB_TILE * UMB_TILE) * sizeof *map->stale);
     return UMB_OK;
 }
 
@@ -362,7 +364,7 @@ typedef struct lanes {
 
 static lanes range_of_lanes(const umb_ray_map *m, const umb_ray_shape *shape, double s0, double s1)
 {
-    double t_min, t_max, n = m->tiles * UMB_TILE;
+    double t_min, t_max, n = m->columns * UMB_TILE;
     range_of_t(m, shape->outline, shape->count, s0, s1, &t_min, &t_max);
     lanes l = {(t_min - m->t0) / m->dt - 0x1p-16, (t_max - m->t0) / m->dt + 0x1p-16};
     l.from = fmax(0.0, floor(l.from));
@@ -374,10 +376,10 @@ static lanes range_of_lanes(const umb_ray_map *m, const umb_ray_shape *shape, do
 
 static void sum_up_group(umb_ray_map *m, uint32_t gi, uint32_t gj)
 {
-    uint32_t groups = m->tiles / UMB_TILE;
+    uint32_t groups = m->columns / UMB_TILE;
     umb_umbra_summary s = {INFINITY, -INFINITY, -INFINITY};
     for (uint32_t i = gi * UMB_TILE; i < (gi + 1) * UMB_TILE; ++i) {
-        const umb_umbra_summary *row = &m->summaries[i * m->tiles + gj * UMB_TILE];
+        const umb_umbra_summary *row = &m->summaries[i * m->columns + gj * UMB_TILE];
         for (uint32_t j = 0; j < UMB_TILE; ++j) {
             s.top = row[j].top < s.top ? row[j].top : s.top;
             s.bottom = row[j].bottom > s.bottom ? row[j].bottom : s.bottom;
@@ -414,14 +416,14 @@ static uint64_t touched_pixels(const umb_ray_map *m, const umb_ray_shape *shape,
 static bool tile_hides(const umb_ray_map *m, const umb_umbra_kernels *kernels, const umb_ray_shape *shape,
                        uint32_t i, uint32_t j)
 {
-    uint32_t tile = i * m->tiles + j;
+    uint32_t tile = i * m->columns + j;
     if (m->live[tile] == 0) {
         return true;
     }
     umb_umbra_query q;
     double u_min, u_max;
     beam b = rectangle(m, i * UMB_TILE, j * UMB_TILE, UMB_TILE);
-    const float *span = m->spans[i * (m->tiles / UMB_TILE) + j / UMB_TILE];
+    const float *span = m->spans[i * (m->columns / UMB_TILE) + j / UMB_TILE];
     if (!range_of_u(m, shape, &b, &u_min, &u_max)) {
         return true;
     }
@@ -438,7 +440,7 @@ static bool tile_hides(const umb_ray_map *m, const umb_umbra_kernels *kernels, c
 
 static bool group_holds(umb_ray_map *m, const umb_ray_shape *shape, uint32_t gi, uint32_t gj, bool *touched)
 {
-    uint32_t groups = m->tiles / UMB_TILE, side = UMB_TILE * UMB_TILE;
+    uint32_t groups = m->columns / UMB_TILE, side = UMB_TILE * UMB_TILE;
     beam b = rectangle(m, gi * side, gj * side, side);
     double u_min, u_max, ua = -INFINITY, ub_min = INFINITY, ub_max = -INFINITY;
     *touched = range_of_u(m, shape, &b, &u_min, &u_max);
@@ -483,8 +485,8 @@ static bool group_hides(umb_ray_map *m, const umb_umbra_kernels *kernels, const 
 
 bool umb_ray_map_hides(umb_ray_map *m, const umb_umbra_kernels *kernels, const umb_ray_shape *shape)
 {
-    uint32_t groups = m->tiles / UMB_TILE, side = UMB_TILE * UMB_TILE;
-    for (uint32_t gi = 0; gi < groups; ++gi) {
+    uint32_t side = UMB_TILE * UMB_TILE;
+    for (uint32_t gi = 0; gi < m->rows / UMB_TILE; ++gi) {
         double s = m->s0 + gi * side * m->ds;
         lanes l = range_of_lanes(m, shape, s, s + side * m->ds);
         if (!(l.from <= l.to)) {
@@ -509,8 +511,8 @@ bool umb_ray_map_closed(umb_ray_map *m, double z_min, double z_max, double gap)
     if (!bounds_of(f, &shape, u, INFINITY, f->hu, -f->hu, f->hu, &q)) {
         return false;
     }
-    uint32_t groups = m->tiles / UMB_TILE;
-    for (uint32_t g = 0; g < groups * groups; ++g) {
+    uint32_t groups = m->columns / UMB_TILE;
+    for (uint32_t g = 0; g < groups * (m->rows / UMB_TILE); ++g) {
         if (m->stale[g]) {
             sum_up_group(m, g / groups, g % groups);
         }

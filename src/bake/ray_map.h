@@ -25,7 +25,7 @@ typedef struct umb_ray_map {
     const umb_ray_frame *frame;
     double alpha0, alpha1, beta0, beta1;
     double s0, t0, ds, dt; /* corner of pixel 0, 0 and the size of a pixel */
-    uint32_t tiles;        /* along a side: a multiple of UMB_TILE */
+    uint32_t rows, columns; /* of tiles, along s and along t: multiples of UMB_TILE */
     uint32_t umbrae;
     umb_umbra_tile *intervals;     /* [tile][umbra]; of a tile never drawn into: not set */
     umb_umbra_summary *summaries;  /* per tile */
@@ -39,7 +39,8 @@ typedef struct umb_ray_map {
 
 typedef enum umb_ray_kind { UMB_RAY_SLAB, UMB_RAY_NEAR, UMB_RAY_FAR } umb_ray_kind;
 
-/* Lay out and empty a map. outer: of the squares. UMB_ERROR_MEMORY leaves nothing behind. A map that was set up before
+/* Lay out and empty a map. outer: of the squares. Squares have resolution x resolution pixels, slabs a quarter as many along
+ * the offset, of which far things need less than of the slope. UMB_ERROR_MEMORY leaves nothing behind. A map that was set up before
  * with the same sizes keeps its memory. */
 umb_result umb_ray_map_begin(umb_ray_map *map, const umb_allocator *a, const umb_ray_frame *frame,
                              umb_ray_kind kind, double outer, uint32_t resolution, uint32_t umbrae);

@@ -56,6 +56,7 @@ void umb_region_destroy(umb_region *region)
     for (int i = 0; i < UMB_REGION_MAPS; ++i) {
         umb_ray_map_free(&region->maps[i], &a);
     }
+    umb_memory_free(&a, region->used, region->used_capacity * sizeof *region->used);
     umb_memory_free(&a, region->queue, region->queue_capacity * sizeof *region->queue);
     umb_memory_free(&a, region->pvs, region->pvs_capacity * sizeof *region->pvs);
     umb_memory_free(&a, region->refined, region->refined_capacity * sizeof *region->refined);

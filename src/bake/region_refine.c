@@ -7,8 +7,9 @@
 #include <string.h>
 
 #include "region_state.h"
+#include "solid_inner.h"
 
-#define MOST_BODIES 96
+#define MOST_BODIES 128
 #define DEFAULT_EFFORT 512
 #define CHUNK 16
 
@@ -107,11 +108,13 @@ static bool beside(const shaft *s, const umb_aabb *b)
     return false;
 }
 
-/* True if every segment from a to b is blocked. bodies: those that may meet one. */
+/* True if every segment from a to b is blocked. bodies: those that may meet one. Whatever of the 64 segments between
+ * corners no body meets will still be there in some part, however small: then it is no use to go on. */
 static bool beam_blocked(search *s, const part *a, const part *b, const uint32_t *bodies, uint32_t count)
 {
     double from[8][3], to[8][3];
-    uint32_t kept[MOST_BODIES], n = 0;
+    uint32_t kept[MOST_BODIES], n = 0, most = 0, best = 0;
+    uint64_t blocked = 0;
     shaft ends;
     if (s->effort == 0) {
         return false;
@@ -119,9 +122,6 @@ static bool beam_blocked(search *s, const part *a, const part *b, const uint32_t
     s->effort -= 1;
     corners_of(a, from);
     corners_of(b, to);
-    umb_corners ca = {(const double(*)[3])from, 8}, cb = {(const double(*)[3])to, 8};
-    umb_corners ma = {&a->middle, 1}, mb = {&b->middle, 1};
-    bool middle = false;
     box_of((const double(*)[3])from, ends.min[0], ends.max[0]);
     box_of((const double(*)[3])to, ends.min[1], ends.max[1]);
     for (uint32_t i = 0; i < count; ++i) {
@@ -129,24 +129,22 @@ static bool beam_blocked(search *s, const part *a, const part *b, const uint32_t
         if (beside(&ends, &body->bounds)) {
             continue;
         }
-        if (umb_solid_blocks(s->solids, body, ma, mb, true) == 1) {
-            if (umb_solid_blocks(s->solids, body, ca, cb, true) == 64) {
-                return true;
-            }
-            middle = true;
-            uint32_t first = kept[0]; /* what blocks the middle is asked first */
-            kept[0] = bodies[i];
-            if (n > 0) {
-                kept[n] = first;
-            }
-            n += 1;
-        } else {
-            kept[n++] = bodies[i];
+        uint64_t own = umb_solid_blocks(s->solids, body, (const double(*)[3])from, (const double(*)[3])to);
+        if (own == UINT64_MAX) {
+            return true;
         }
+        uint32_t weight = (uint32_t)__builtin_popcountll(own);
+        best = weight > most ? n : best;
+        most = weight > most ? weight : most;
+        blocked |= own;
+        kept[n++] = bodies[i];
     }
-    if (!middle) {
+    if (blocked != UINT64_MAX) {
         return false;
     }
+    uint32_t first = kept[0]; /* what blocks most is asked first */
+    kept[0] = kept[best];
+    kept[best] = first;
     double la, lb;
     int axis_a = longest_axis(a, &la), axis_b = longest_axis(b, &lb);
     for (int side = -1; side <= 1; side += 2) {
@@ -253,13 +251,31 @@ static void decide_chunk(void *data, uint32_t chunk)
     }
 }
 
+static umb_result find_bodies(umb_region *r)
+{
+    const umb_committed *c = umb_scene_committed(umb_index_scene(r->index));
+    const double(*corners)[3] = (const double(*)[3])r->corners;
+    umb_result result = UMB_OK;
+    r->solids.count = r->solids.plane_count = 0;
+    for (size_t i = 0; i < r->used_count && result == UMB_OK; ++i) {
+        const umb_occluder *o = &c->occluders[r->used[i]];
+        bool added;
+        result = umb_solids_add(&r->solids, o, r->used[i], corners, &added);
+        if (result == UMB_OK && !added && !o->mesh->convex) {
+            result = umb_solids_add_inner(&r->solids, o, r->used[i], corners);
+        }
+    }
+    return result;
+}
+
 umb_result umb_region_decide(umb_region *r, uint32_t effort)
 {
     umb_region_answer *a = &r->answer;
     refinement f = {.region = r, .effort = effort != 0 ? effort : DEFAULT_EFFORT};
     f.objects = umb_scene_committed(umb_index_scene(r->index))->objects;
     f.states = umb_memory_allocate_zero(&r->allocator, (size_t)a->pvs_count + 1, sizeof *f.states);
-    if (f.states == NULL) {
+    if (f.states == NULL || find_bodies(r) != UMB_OK) {
+        umb_memory_free(&r->allocator, f.states, (size_t)a->pvs_count + 1);
         return UMB_ERROR_MEMORY;
     }
     f.cell = part_of_box(r->query.min, r->query.max, 0x1p-50 * r->reach);

@@ -286,10 +286,11 @@ static umb_result block(umb_region *r, const umb_occluder *o)
         return UMB_OK;
     }
     r->answer.stats.occluders += 1;
-    bool added;
-    umb_result result = umb_solids_add(&r->solids, o, (uint32_t)(o - umb_scene_committed(umb_index_scene(r->index))->occluders),
-                                       (const double(*)[3])r->corners, &added);
-    return result == UMB_OK ? umb_pieces_cut(&r->pieces, o) : result;
+    if (!umb_memory_reserve(&r->allocator, (void **)&r->used, &r->used_capacity, r->used_count + 1, sizeof *r->used)) {
+        return UMB_ERROR_MEMORY;
+    }
+    r->used[r->used_count++] = (uint32_t)(o - umb_scene_committed(umb_index_scene(r->index))->occluders);
+    return umb_pieces_cut(&r->pieces, o);
 }
 
 /* ---- the walk ------------------------------------------------------------------------------------ */
@@ -379,7 +380,7 @@ umb_result umb_region_walk(umb_region *r)
     r->pieces.reach = r->reach;
     r->pieces.emit = block_piece;
     r->pieces.user = r;
-    r->queue_count = 0;
+    r->queue_count = r->used_count = 0;
     umb_result result = begin_maps(r);
     for (uint32_t k = 0; k < (tree->flat ? tree->node_count : tree->node_count > 0 ? 1u : 0u) && result == UMB_OK; ++k) {
         result = push_children(r, &tree->nodes[k]);

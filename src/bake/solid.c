@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "geometry/orient.h"
 #include "geometry/transform.h"
 
 void umb_solids_free(umb_solids *s)
@@ -87,6 +88,30 @@ static bool boxes_apart(const umb_aabb *a, const double box[8][3])
     return false;
 }
 
+/* A triangle in exactly the plane of one before it adds nothing. */
+static bool plane_before(const umb_mesh *m, const double p[][3], uint32_t triangle)
+{
+    float v[3][3], w[3];
+    for (uint32_t t = 0; t < triangle; ++t) {
+        bool same = true;
+        for (int c = 0; c < 3; ++c) {
+            for (int k = 0; k < 3; ++k) {
+                v[c][k] = (float)p[m->triangles[t][c]][k];
+            }
+        }
+        for (int c = 0; c < 3 && same; ++c) {
+            for (int k = 0; k < 3; ++k) {
+                w[k] = (float)p[m->triangles[triangle][c]][k];
+            }
+            same = umb_orient(v[0], v[1], v[2], w) == 0;
+        }
+        if (same) {
+            return true;
+        }
+    }
+    return false;
+}
+
 umb_result umb_solids_add(umb_solids *s, const umb_occluder *o, uint32_t number, const double box[8][3],
                           bool *added)
 {
@@ -109,8 +134,12 @@ umb_result umb_solids_add(umb_solids *s, const umb_occluder *o, uint32_t number,
         }
     }
     bool apart = boxes_apart(&o->bounds, box), solid = true;
+    uint32_t planes = 0;
     for (uint32_t t = 0; t < m->triangle_count; ++t) {
-        double error, *plane = s->planes[first + t];
+        if (plane_before(m, (const double(*)[3])p, t)) {
+            continue;
+        }
+        double error, *plane = s->planes[first + planes++];
         make_plane((const double(*)[3])p, m->triangles[t], o->mirrored, s->reach, plane, &error);
         solid = solid && value(plane, inner) < 0.0;
         apart = apart || separates(plane, error, (const double(*)[3])p, m->block_position_count, box);
@@ -119,49 +148,60 @@ umb_result umb_solids_add(umb_solids *s, const umb_occluder *o, uint32_t number,
         return UMB_OK;
     }
     umb_solid *body = &s->items[s->count++];
-    *body = (umb_solid){o->bounds, number, (uint32_t)first, m->triangle_count, {inner[0], inner[1], inner[2]}};
-    s->plane_count = first + m->triangle_count;
+    *body = (umb_solid){o->bounds, number, (uint32_t)first, planes, {inner[0], inner[1], inner[2]}};
+    s->plane_count = first + planes;
     *added = true;
     return UMB_OK;
 }
 
-/* What is left of a segment inside all planes is not empty. Its ends are quotients of numbers of opposite signs, right
- * to 2^-51. */
-static bool meets(const double (*planes)[4], uint32_t count, const double a[3], const double b[3])
+/* Eight segments from one point: where they are inside all planes so far. */
+typedef struct stretch {
+    double from[8], to[8];
+} stretch;
+
+/* Cut eight segments by a plane. Ends are quotients of numbers of opposite signs, right to 2^-51. */
+static void cut(stretch *s, double va, const double vb[8])
 {
-    double from = 0.0, to = 1.0;
-    for (uint32_t i = 0; i < count; ++i) {
-        double va = value(planes[i], a), vb = value(planes[i], b);
-        if (!(va > 0.0) && !(vb > 0.0)) {
-            continue;
-        }
-        if (!(va <= 0.0) && !(vb <= 0.0)) {
-            return false;
-        }
-        double at = va / (va - vb);
-        if (va > 0.0) {
-            from = at > from ? at : from;
-        } else {
-            to = at < to ? at : to;
-        }
-        if (!(from + 0x1p-48 <= to)) {
-            return false;
-        }
+    for (int j = 0; j < 8; ++j) {
+        double at = va / (va - vb[j]);
+        bool enters = va > 0.0 && vb[j] <= 0.0, leaves = va <= 0.0 && vb[j] > 0.0, never = va > 0.0 && vb[j] > 0.0;
+        double from = enters ? at : never ? 2.0 : 0.0, to = leaves ? at : 1.0;
+        s->from[j] = from > s->from[j] ? from : s->from[j];
+        s->to[j] = to < s->to[j] ? to : s->to[j];
     }
-    return true;
 }
 
-uint32_t umb_solid_blocks(const umb_solids *s, const umb_solid *body, umb_corners a, umb_corners b, bool all)
+uint64_t umb_solid_blocks(const umb_solids *s, const umb_solid *body, const double a[8][3], const double b[8][3])
 {
     const double(*planes)[4] = (const double(*)[4])s->planes + body->first_plane;
-    uint32_t blocked = 0;
-    for (uint32_t i = 0; i < a.count; ++i) {
-        for (uint32_t j = 0; j < b.count; ++j) {
-            if (meets(planes, body->plane_count, a.points[i], b.points[j])) {
-                blocked += 1;
-            } else if (all) {
-                return blocked;
-            }
+    stretch stretches[8];
+    for (int i = 0; i < 8; ++i) {
+        for (int j = 0; j < 8; ++j) {
+            stretches[i].from[j] = 0.0;
+            stretches[i].to[j] = 1.0;
+        }
+    }
+    for (uint32_t k = 0; k < body->plane_count; ++k) {
+        double va[8], vb[8];
+        uint32_t a_out = 0, b_out = 0;
+        for (int i = 0; i < 8; ++i) {
+            va[i] = value(planes[k], a[i]);
+            vb[i] = value(planes[k], b[i]);
+            a_out += va[i] > 0.0 ? 1 : 0;
+            b_out += vb[i] > 0.0 ? 1 : 0;
+        }
+        if (a_out == 8 && b_out == 8) {
+            return 0;
+        }
+        for (int i = 0; i < 8 && a_out + b_out > 0; ++i) {
+            cut(&stretches[i], va[i], vb);
+        }
+    }
+    uint64_t blocked = 0;
+    for (int i = 0; i < 8; ++i) {
+        for (int j = 0; j < 8; ++j) {
+            bool meets = stretches[i].from[j] + 0x1p-48 <= stretches[i].to[j];
+            blocked |= (uint64_t)meets << (8 * i + j);
         }
     }
     return blocked;

@@ -38,15 +38,8 @@ void umb_solid_vertices(const umb_occluder *o, double out[][3]);
 umb_result umb_solids_add(umb_solids *s, const umb_occluder *o, uint32_t number, const double box[8][3],
                           bool *added);
 
-/* Points of which every segment to a point of another set is asked about. */
-typedef struct umb_corners {
-    const double (*points)[3];
-    uint32_t count; /* at most 8 */
-} umb_corners;
-
-/* How many of the segments from a point of a to a point of b surely meet the body; stops at the first that does not
- * when all is set. */
-uint32_t umb_solid_blocks(const umb_solids *s, const umb_solid *body, umb_corners a, umb_corners b, bool all);
+/* Which of the 64 segments from the eight points of a to those of b surely meet the body: bit 8 i + j for a[i], b[j]. */
+uint64_t umb_solid_blocks(const umb_solids *s, const umb_solid *body, const double a[8][3], const double b[8][3]);
 
 /* The eight corners of a box. */
 void umb_box_corners(const double min[3], const double max[3], double out[8][3]);

@@ -1,0 +1,12 @@
+/* Convex bodies inside solids that are not convex. */
+#ifndef UMB_SOLID_INNER_H
+#define UMB_SOLID_INNER_H
+
+#include "solid.h"
+
+/* Add, for each flat convex face of an occluder that umb_closed_solid() proves to be a solid, what lies behind the face as
+ * deep as nothing else of the surface comes in: the wings of a building. Bodies overlap where wings meet. The cell (its
+ * corners) must be outside the occluder's bounds, else nothing is added. */
+umb_result umb_solids_add_inner(umb_solids *s, const umb_occluder *o, uint32_t number, const double box[8][3]);
+
+#endif
