@@ -11,7 +11,9 @@
 
 #include <cmocka.h>
 
+#include "bake/region_state.h"
 #include "support/failing.h"
+#include "support/mutants.h"
 #include "support/segments.h"
 
 typedef struct world {
@@ -113,6 +115,9 @@ static void check_hidden(const world *w, const umb_region_query *q, const uint32
             t->rays += 1;
             if (segments_free_way(w->segments, a, b)) {
                 t->wrong += 1;
+                if (w->region->kernels != umb_umbra_kernels_get(UMB_ISA_AUTO)) {
+                    break;
+                }
                 printf("object %u hidden, seen from %.9g %.9g %.9g at %.9g %.9g %.9g\n", i, a[0], a[1], a[2], b[0],
                        b[1], b[2]);
                 printf("  cell %.9g,%.9g,%.9g,%.9g,%.9g,%.9g up %d res %u K %u R %g half %d\n", q->min[0], q->min[1],
@@ -212,13 +217,101 @@ static void test_blocks(void **state)
     run_scene("gen:blocks,g=8", true, is_small() ? 6 : 40, 20, 7);
 }
 
-int main(void)
+/* ---- planted mistakes ------------------------------------------------------------------------- */
+
+typedef struct hunt {
+    const char *scene; /* NULL: the walls */
+    uint32_t cells;
+} hunt;
+
+/* Four long walls around the middle, leaning a little, and small boxes beyond them at all heights. */
+static model *make_walls(void)
+{
+    static const uint32_t faces[12][3] = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                                          {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+    float corners[8][3];
+    uint8_t flags[12] = {0};
+    dice d = {5};
+    for (int c = 0; c < 8; ++c) {
+        for (int k = 0; k < 3; ++k) {
+            corners[c][k] = (c >> k & 1) != 0 ? 0.5f : -0.5f;
+        }
+    }
+    model_mesh mesh = {&corners[0][0], (uint32_t *)faces, flags, 8, 12};
+    model *m = model_create();
+    umb_error error;
+    uint32_t cube = model_add_mesh(m, &mesh);
+    for (int i = 0; i < 4; ++i) {
+        float c = i % 2 == 0 ? 1.0f : 0.0f, sign = i < 2 ? 1.0f : -1.0f, lean = 0.3f * (float)i;
+        umb_transform t = {{{80 * c + 2 * (1 - c), 0, lean, 30 * sign * (1 - c)},
+                            {0, 24, 0, 6},
+                            {lean, 0, 80 * (1 - c) + 2 * c, 30 * sign * c}}};
+        (void)model_add_object(m, "wall", cube, &t);
+    }
+    for (int i = 0; i < 600; ++i) {
+        double angle = 6.283 * unit(&d), far = 60 + 100 * unit(&d), size = 0.5 + 3 * unit(&d);
+        umb_transform t = {{{(float)size, 0, 0, (float)(far * cos(angle))},
+                            {0, (float)size, 0, (float)(120 * unit(&d) - 30)},
+                            {0, 0, (float)size, (float)(far * sin(angle))}}};
+        (void)model_add_object(m, "box", cube, &t);
+    }
+    assert_true(model_finish(m, NULL, &error));
+    return m;
+}
+
+/* How many objects are hidden wrongly with these kernels. Cells lie among the boxes, resolutions are low. */
+static uint32_t hunt_with(const umb_umbra_kernels *kernels, uint32_t *hidden)
+{
+    static const hunt hunts[] = {{NULL, 60}, {"gen:boxfield,polygons=6000,seed=3", 20}, {"gen:blocks,g=6", 20}};
+    tally t = {0};
+    for (size_t k = 0; k < sizeof hunts / sizeof hunts[0]; ++k) {
+        world w;
+        if (hunts[k].scene != NULL) {
+            open_world(&w, hunts[k].scene, true);
+        } else {
+            open_model(&w, make_walls(), true, false);
+        }
+        w.region->kernels = kernels;
+        dice d = {77};
+        for (uint32_t i = 0; i < hunts[k].cells; ++i) {
+            umb_region_query q = {.resolution = 64, .umbrae = 1 + i % 4};
+            umb_region_answer a;
+            static const umb_aabb inside = {{-24, 0, -24}, {24, 10, 24}};
+            draw_cell(&d, hunts[k].scene != NULL ? &w.model->bounds : &inside, &q);
+            assert_int_equal(umb_region_solve(w.region, &q, &a), UMB_OK);
+            check_hidden(&w, &q, a.pvs, a.pvs_count, 100, &d, &t);
+        }
+        close_world(&w);
+    }
+    *hidden = t.hidden;
+    return t.wrong;
+}
+
+static void test_mutants(void **state)
+{
+    (void)state;
+    static const umb_umbra_kernels *const mutants[MUTANT_COUNT] = {&mutant_1, &mutant_2, &mutant_3, &mutant_4};
+    uint32_t hidden, bad = 0;
+    assert_int_equal(hunt_with(umb_umbra_kernels_get(UMB_ISA_AUTO), &hidden), 0);
+    for (int i = 0; i < MUTANT_COUNT; ++i) {
+        uint32_t wrong = hunt_with(mutants[i], &hidden);
+        printf("mistake %d: %u of %u hidden wrongly\n", i + 1, wrong, hidden);
+        bad += wrong == 0 ? 1 : 0;
+    }
+    assert_int_equal(bad, 0);
+}
+
+int main(int count, char **words)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_city),
         cmocka_unit_test(test_boxfield),
         cmocka_unit_test(test_building),
         cmocka_unit_test(test_blocks),
+        cmocka_unit_test(test_mutants),
     };
+    if (count > 1) {
+        cmocka_set_test_filter(words[1]);
+    }
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -5,10 +5,13 @@
 #include "geometry/orient.h"
 #include "geometry/vec.h"
 
+/* Every edge has two triangles that run against one another, and no more: entries of one edge are neighbours. */
 static bool all_edges_paired(const umb_mesh *m)
 {
     for (uint32_t i = 0; i < m->edge_count; ++i) {
-        if (m->edges[i].f1 == UMB_NONE || (m->edges[i].f1 & UMB_EDGE_SAME) != 0) {
+        const umb_edge *e = &m->edges[i], *next = &m->edges[i + 1 < m->edge_count ? i + 1 : i];
+        bool again = next != e && ((e->v0 == next->v0 && e->v1 == next->v1) || (e->v0 == next->v1 && e->v1 == next->v0));
+        if (again || m->edges[i].f1 == UMB_NONE || (m->edges[i].f1 & UMB_EDGE_SAME) != 0) {
             return false;
         }
     }

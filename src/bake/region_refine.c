@@ -12,6 +12,10 @@
 #define MOST_BODIES 128
 #define DEFAULT_EFFORT 512
 #define CHUNK 16
+/* Parts are larger than what they stand for by this much of the reach, hundreds of times what sums of their corners
+ * lose on the way down; none is cut whose halves would overlap by less than that. */
+#define PART_MARGIN 0x1p-44
+#define LEAST_PART 0x1p-19
 
 /* A part of the cell or of an object: a middle and three half axes. */
 typedef struct part {
@@ -56,7 +60,7 @@ static part half_of(const part *p, int axis, double side)
 {
     part h = *p;
     for (int k = 0; k < 3; ++k) {
-        h.axes[axis][k] = 0.5 * p->axes[axis][k] * (1.0 + 0x1p-30);
+        h.axes[axis][k] = 0.5 * p->axes[axis][k] * (1.0 + 0x1p-24);
         h.middle[k] = p->middle[k] + side * 0.5 * p->axes[axis][k];
     }
     return h;
@@ -147,6 +151,10 @@ static bool beam_blocked(search *s, const part *a, const part *b, const uint32_t
     kept[best] = first;
     double la, lb;
     int axis_a = longest_axis(a, &la), axis_b = longest_axis(b, &lb);
+    double least = LEAST_PART * s->solids->reach;
+    if (!(fmax(la, lb) > least * least)) {
+        return false;
+    }
     for (int side = -1; side <= 1; side += 2) {
         part half = la > lb ? half_of(a, axis_a, side) : half_of(b, axis_b, side);
         if (!beam_blocked(s, la > lb ? &half : a, la > lb ? b : &half, kept, n)) {
@@ -178,7 +186,7 @@ static part part_of_object(const umb_object *o, double reach)
         min[k] = o->bounds.min[k];
         max[k] = o->bounds.max[k];
     }
-    part p = part_of_box(min, max, 0x1p-50 * reach);
+    part p = part_of_box(min, max, PART_MARGIN * reach);
     if (!o->refine || o->identity) {
         return p;
     }
@@ -278,7 +286,7 @@ umb_result umb_region_decide(umb_region *r, uint32_t effort)
         umb_memory_free(&r->allocator, f.states, (size_t)a->pvs_count + 1);
         return UMB_ERROR_MEMORY;
     }
-    f.cell = part_of_box(r->query.min, r->query.max, 0x1p-50 * r->reach);
+    f.cell = part_of_box(r->query.min, r->query.max, PART_MARGIN * r->reach);
     for (int k = 0; k < 3; ++k) {
         f.cell_min[k] = f.cell.middle[k] - f.cell.axes[k][k];
         f.cell_max[k] = f.cell.middle[k] + f.cell.axes[k][k];

@@ -4,6 +4,11 @@
 #include "base/simd.h"
 #include "umbra_kernels.h"
 
+/* Tests plant mistakes, to see that they are found: 1 to 4. */
+#ifndef UMB_MUTANT
+#define UMB_MUTANT 0
+#endif
+
 #define COLUMNS ((UMB_TILE + 1) * UMB_TILE) /* corners along t of the widest run, and some to spare */
 #define ROUNDING 0x1p-21f                   /* of a quotient, and of what is added to it */
 #define LEAST 1e-30f
@@ -66,6 +71,9 @@ UMB_INLINE void cross_top(const umb_umbra *o, const crossing *c, bool near_quoti
 {
     umb_fv up = c->z - o->z1 - c->error_z, a = c->u - o->ua, b = c->u - o->ub;
     umb_iv above = (umb_iv)(up >= 0.0f);
+#if UMB_MUTANT == 2 /* the front of the cell for every top */
+    above = umb_iv_set(0);
+#endif
     *m = lower(up / umb_fv_select(above, a + c->error_u, b - c->error_u));
     if (!half) {
         umb_fv rise = c->z - o->z0 - c->error_z, from = near_quotient ? b : a;
@@ -133,7 +141,11 @@ static void corners_of_row(const umb_umbra *o, bool half, uint32_t columns, floa
     umb_fv r = umb_fv_set(row);
     for (uint32_t j = 0; j < columns; j += UMB_LANES) {
         sums s;
+#if UMB_MUTANT == 1 /* middles of pixels instead of their corners */
+        corners_of_vector(o, half, r + 0.5f, lanes_from((float)j + 0.5f), &s);
+#else
         corners_of_vector(o, half, r, lanes_from((float)j), &s);
+#endif
         umb_fv_store(out->top + j, s.top);
         umb_fv_store(out->depth + j, s.depth);
         umb_fv_store(out->margin + j, s.margin);
@@ -147,12 +159,20 @@ static void corners_of_row(const umb_umbra *o, bool half, uint32_t columns, floa
 
 UMB_INLINE umb_fv least_of_four(const float *a, const float *b)
 {
+#if UMB_MUTANT == 1
+    (void)b;
+    return umb_fv_load(a);
+#endif
     return umb_fv_min(umb_fv_min(umb_fv_load(a), umb_fv_load(a + 1)),
                       umb_fv_min(umb_fv_load(b), umb_fv_load(b + 1)));
 }
 
 UMB_INLINE umb_fv most_of_four(const float *a, const float *b)
 {
+#if UMB_MUTANT == 1
+    (void)b;
+    return umb_fv_load(a);
+#endif
     return umb_fv_max(umb_fv_max(umb_fv_load(a), umb_fv_load(a + 1)),
                       umb_fv_max(umb_fv_load(b), umb_fv_load(b + 1)));
 }
@@ -165,6 +185,9 @@ UMB_INLINE void over_pixel(const umb_umbra_vertex *v, umb_fv row, umb_fv column,
     float low = (v->ds > 0.0f ? v->ds : 0.0f) + (v->dt > 0.0f ? v->dt : 0.0f);
     *least = f - low - v->error;
     *most = f + high + v->error;
+#if UMB_MUTANT == 4 /* covered where its middle is */
+    *least = *most = f - 0.5f * (v->ds + v->dt);
+#endif
 }
 
 /* Pixels that straddle a vertex of a chain see it. */
@@ -268,6 +291,9 @@ UMB_INLINE umb_iv join(umb_umbra_tile *tiles, uint32_t umbrae, uint32_t at, sums
         umb_iv inside = here & (umb_iv)((c->top >= old.top) & (c->bottom <= old.bottom) & (old.top > -INFINITY));
         umb_iv meet = here & ~inside & (umb_iv)((old.top >= c->bottom_far) & (old.top_far >= c->bottom) &
                                                 (c->top >= old.bottom_far) & (c->top_far >= old.bottom));
+#if UMB_MUTANT == 3 /* joined without a look at whether they overlap */
+        meet = here & ~inside & (umb_iv)(old.top > -INFINITY);
+#endif
         if (!umb_iv_any(inside | meet)) {
             continue;
         }

@@ -1,0 +1,7 @@
+/* umbra_kernels.inl with a mistake: see UMB_MUTANT there. */
+#include "mutants.h"
+
+#define KERNELS mutant_3
+#define ISA UMB_ISA_SCALAR
+#define UMB_MUTANT 3
+#include "bake/umbra_kernels.inl"

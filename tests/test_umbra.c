@@ -1,0 +1,287 @@
+/* What from-region visibility stands on (docs/conservative.md, section 14): T1 and T3 in random slices, T5 with random
+ * bodies, rays and the maps that have to hold them, kernels equal to the bit. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "bake/ray_map.h"
+#include "bake/region_state.h"
+#include "support/failing.h"
+
+static bool is_small(void)
+{
+    const char *size = getenv("UMBRAGE_TEST_SIZE");
+    return size != NULL && strcmp(size, "small") == 0;
+}
+
+static double between(dice *d, double low, double high)
+{
+    return low + (high - low) * (dice_roll(d, 1u << 30) / (double)(1u << 30));
+}
+
+/* ---- slices ----------------------------------------------------------------------------------- */
+
+typedef struct point {
+    double u, z;
+} point;
+
+typedef struct slice {
+    double ua, ub, z0, z1; /* the cell */
+} slice;
+
+static double least_slope(const slice *k, point p)
+{
+    return fmin((p.z - k->z1) / (p.u - k->ua), (p.z - k->z1) / (p.u - k->ub));
+}
+
+static double greatest_slope(const slice *k, point p)
+{
+    return fmax((p.z - k->z0) / (p.u - k->ua), (p.z - k->z0) / (p.u - k->ub));
+}
+
+static slice draw_slice(dice *d)
+{
+    slice k = {between(d, -3, 0), 0, between(d, -2, 0), 0};
+    k.ub = k.ua + between(d, 0.01, 4);
+    k.z1 = k.z0 + (dice_roll(d, 5) == 0 ? 0.0 : between(d, 0, 3));
+    return k;
+}
+
+static point draw_point(dice *d, const slice *k, double far)
+{
+    return (point){k->ub + between(d, 0.05, far), between(d, -6, 8)};
+}
+
+/* The segment from a point of the cell to q crosses the segment pb pt. */
+static bool crosses(point from, point q, point pb, point pt)
+{
+    double a = (q.u - from.u) * (pb.z - from.z) - (q.z - from.z) * (pb.u - from.u);
+    double b = (q.u - from.u) * (pt.z - from.z) - (q.z - from.z) * (pt.u - from.u);
+    return a <= 1e-9 && b >= -1e-9; /* both ends lie before q */
+}
+
+static point draw_from(dice *d, const slice *k)
+{
+    bool corner = dice_roll(d, 2) == 0;
+    return (point){corner ? (dice_roll(d, 2) ? k->ua : k->ub) : between(d, k->ua, k->ub),
+                   corner ? (dice_roll(d, 2) ? k->z0 : k->z1) : between(d, k->z0, k->z1)};
+}
+
+/* T1: both ways. */
+static void test_slices(void **state)
+{
+    (void)state;
+    dice d = {11};
+    uint32_t hidden = 0, slices = is_small() ? 20000 : 400000;
+    for (uint32_t i = 0; i < slices; ++i) {
+        slice k = draw_slice(&d);
+        point pt = draw_point(&d, &k, 8), pb = draw_point(&d, &k, 8), q = draw_point(&d, &k, 14);
+        q.u = fmax(q.u, fmax(pt.u, pb.u) + 1e-3);
+        double m_gap = least_slope(&k, pt) - least_slope(&k, q), M_gap = greatest_slope(&k, q) - greatest_slope(&k, pb);
+        bool free = false;
+        for (int c = 0; c < 4; ++c) {
+            point from = {(c & 1) != 0 ? k.ua : k.ub, (c & 2) != 0 ? k.z0 : k.z1};
+            free = free || !crosses(from, q, pb, pt);
+        }
+        for (int n = 0; n < 20 && m_gap >= 0.0 && M_gap >= 0.0; ++n) {
+            assert_true(crosses(draw_from(&d, &k), q, pb, pt));
+        }
+        hidden += m_gap >= 0.0 && M_gap >= 0.0 ? 1 : 0;
+        assert_true(free || (m_gap > -1e-6 && M_gap > -1e-6)); /* nothing is missed */
+    }
+    assert_true(hidden > slices / 50);
+}
+
+/* T3: what is joined of an upper and a lower segment blocks what the joined interval says. */
+static void test_joins(void **state)
+{
+    (void)state;
+    dice d = {12};
+    uint32_t joined = 0, slices = is_small() ? 20000 : 400000;
+    for (uint32_t i = 0; i < slices; ++i) {
+        slice k = draw_slice(&d);
+        point ct = draw_point(&d, &k, 8), cb = draw_point(&d, &k, 8), ot = draw_point(&d, &k, 8), ob = draw_point(&d, &k, 8);
+        bool meet = least_slope(&k, ot) >= least_slope(&k, cb) && greatest_slope(&k, ot) >= greatest_slope(&k, cb);
+        point q = draw_point(&d, &k, 14);
+        q.u = fmax(fmax(q.u, fmax(ct.u, cb.u) + 1e-3), fmax(ot.u, ob.u) + 1e-3);
+        if (!meet || least_slope(&k, q) > least_slope(&k, ct) || greatest_slope(&k, q) < greatest_slope(&k, ob)) {
+            continue;
+        }
+        joined += 1;
+        for (int n = 0; n < 40; ++n) {
+            point from = draw_from(&d, &k);
+            assert_true(crosses(from, q, cb, ct) || crosses(from, q, ob, ot));
+        }
+    }
+    assert_true(joined > 100);
+}
+
+/* ---- bodies ----------------------------------------------------------------------------------- */
+
+/* T5: when all 64 segments between corners meet a body, so do segments between points inside. */
+static void test_corners(void **state)
+{
+    (void)state;
+    umb_allocator a = umb_memory_allocator(NULL);
+    dice d = {13};
+    uint32_t all = 0, rounds = is_small() ? 3000 : 60000;
+    double planes[6][4];
+    umb_solid body = {.plane_count = 6};
+    umb_solids solids = {.allocator = &a, .items = &body, .planes = planes, .count = 1};
+    for (uint32_t i = 0; i < rounds; ++i) {
+        double low[3], high[3], min[2][3], max[2][3], corners[2][8][3];
+        for (int k = 0; k < 3; ++k) {
+            low[k] = k == 0 ? between(&d, 3, 5) : between(&d, -4, 0);
+            high[k] = k == 0 ? low[k] + between(&d, 0.1, 3) : between(&d, 0, 4);
+            for (int s = 0; s < 2; ++s) {
+                min[s][k] = k == 0 ? (s == 0 ? between(&d, -2, 2) : between(&d, 9, 20)) : between(&d, -2, 2);
+                max[s][k] = min[s][k] + between(&d, 0, 1.5);
+            }
+            for (int s = 0; s < 2; ++s) {
+                memset(planes[2 * k + s], 0, sizeof planes[0]);
+                planes[2 * k + s][k] = s == 0 ? 1.0 : -1.0;
+                planes[2 * k + s][3] = s == 0 ? -high[k] : low[k];
+            }
+        }
+        umb_box_corners(min[0], max[0], corners[0]);
+        umb_box_corners(min[1], max[1], corners[1]);
+        uint64_t blocked = umb_solid_blocks(&solids, &body, (const double(*)[3])corners[0], (const double(*)[3])corners[1]);
+        if (blocked != UINT64_MAX) {
+            continue;
+        }
+        all += 1;
+        for (int n = 0; n < 20; ++n) {
+            double p[2][8][3];
+            for (int s = 0; s < 2; ++s) {
+                for (int k = 0; k < 3; ++k) {
+                    double x = between(&d, min[s][k], max[s][k]);
+                    for (int c = 0; c < 8; ++c) {
+                        p[s][c][k] = x;
+                    }
+                }
+            }
+            assert_true(umb_solid_blocks(&solids, &body, (const double(*)[3])p[0], (const double(*)[3])p[1]) == UINT64_MAX);
+        }
+    }
+    assert_true(all > rounds / 100);
+}
+
+/* ---- rays --------------------------------------------------------------------------------------- */
+
+/* Every horizontal ray that leaves the cell goes through a live pixel of one of the maps of the frames that look its
+ * way. */
+static void check_rays(double hu, double hv, double outer, uint64_t seed)
+{
+    umb_allocator a = umb_memory_allocator(NULL);
+    dice d = {seed};
+    umb_ray_frame frames[4] = {{hu, hv, -1, 1, {0, 0, 0}, 0, 1, 2, 1, 0}, {hu, hv, -1, 1, {0, 0, 0}, 0, 1, 2, -1, 0},
+                               {hv, hu, -1, 1, {0, 0, 0}, 1, 0, 2, 1, 0}, {hv, hu, -1, 1, {0, 0, 0}, 1, 0, 2, -1, 0}};
+    umb_ray_map maps[8] = {0};
+    uint32_t count = outer == 0.0 ? 4 : 8;
+    for (uint32_t k = 0; k < count; ++k) {
+        umb_ray_kind kind = outer == 0.0 ? UMB_RAY_SLAB : k < 4 ? UMB_RAY_NEAR : UMB_RAY_FAR;
+        assert_int_equal(umb_ray_map_begin(&maps[k], &a, &frames[k % 4], kind, outer, 64, 1), UMB_OK);
+    }
+    for (uint32_t i = 0; i < (is_small() ? 2000u : 20000u); ++i) {
+        double from[3] = {between(&d, -hu, hu), between(&d, -hv, hv), 0}, angle = between(&d, 0, 6.283185307179586);
+        double to[3] = {from[0] + 50 * (hu + hv) * cos(angle), from[1] + 50 * (hu + hv) * sin(angle), 0};
+        bool found = false;
+        for (uint32_t k = 0; k < count && !found; ++k) {
+            const umb_ray_map *m = &maps[k];
+            umb_ray_point p = umb_ray_frame_point(m->frame, from), q = umb_ray_frame_point(m->frame, to);
+            if (q.u <= p.u) {
+                continue;
+            }
+            double slope = (q.v - p.v) / (q.u - p.u), at0 = p.v - slope * p.u;
+            double ui = -m->beta0 / m->beta1, uo = ui + 1.0 / m->beta1;
+            double s = m->alpha1 == 0.0 ? at0 : at0 + slope * ui, t = m->alpha1 == 0.0 ? slope : at0 + slope * uo;
+            double i_s = floor((s - m->s0) / m->ds), i_t = floor((t - m->t0) / m->dt);
+            if (i_s < 0 || i_t < 0 || i_s >= m->rows * UMB_TILE || i_t >= m->columns * UMB_TILE) {
+                continue;
+            }
+            uint32_t r = (uint32_t)i_s, c = (uint32_t)i_t;
+            found = (m->live[r / UMB_TILE * m->columns + c / UMB_TILE] >> (r % UMB_TILE * UMB_TILE + c % UMB_TILE) & 1) != 0;
+        }
+        assert_true(found);
+    }
+    for (uint32_t k = 0; k < count; ++k) {
+        umb_ray_map_free(&maps[k], &a);
+    }
+}
+
+static void test_rays(void **state)
+{
+    (void)state;
+    static const double outers[] = {0.0, 1.2, 2.0, 8.0, 100.0};
+    for (size_t i = 0; i < sizeof outers / sizeof outers[0]; ++i) {
+        check_rays(1, 1, outers[i], 21);
+        check_rays(5, 0.5, outers[i], 22);
+        check_rays(0.2, 3, outers[i], 23);
+    }
+}
+
+/* ---- kernels ------------------------------------------------------------------------------------ */
+
+/* A convex body drawn at random before the cell, into a map of its own, with one set of kernels. */
+static void draw_bodies(const umb_umbra_kernels *kernels, umb_ray_map *m, bool half)
+{
+    dice d = {31};
+    for (int i = 0; i < 40; ++i) {
+        umb_ray_blocker b = {.convex = i % 3 != 0, .floor = true};
+        double u = between(&d, 4, 40), v = between(&d, -30, 30), z = between(&d, -2, 8);
+        b.count = b.convex ? 8 : 4;
+        b.ring = b.convex ? 0 : 4;
+        for (uint32_t c = 0; c < b.count; ++c) {
+            double side = b.convex ? (c & 1) : (c == 1 || c == 2), up = b.convex ? (c >> 1 & 1) : c > 1;
+            b.vertices[c] = (umb_ray_point){u + 3 * (double)(c >> 2) + between(&d, 0, 1), v + 6 * side, half ? 9 * up - 1 : z + 3 * up};
+            b.on_floor[c] = half && up == 0.0;
+        }
+        umb_ray_map_block(m, kernels, &b, half);
+    }
+}
+
+static void test_kernels(void **state)
+{
+    (void)state;
+    static const umb_isa isas[] = {UMB_ISA_SSE4, UMB_ISA_AVX2, UMB_ISA_NEON};
+    umb_allocator a = umb_memory_allocator(NULL);
+    umb_ray_frame frame = {2, 2, -1, 1, {0, 0, 0}, 0, 1, 2, 1, 1e-12};
+    for (uint32_t umbrae = 1; umbrae <= 4; ++umbrae) {
+        umb_ray_map scalar = {0}, other = {0};
+        bool half = umbrae == 1;
+        assert_int_equal(umb_ray_map_begin(&scalar, &a, &frame, UMB_RAY_SLAB, 0.0, 128, umbrae), UMB_OK);
+        draw_bodies(umb_umbra_kernels_get(UMB_ISA_SCALAR), &scalar, half);
+        for (size_t k = 0; k < sizeof isas / sizeof isas[0]; ++k) {
+            if (!umb_isa_available(isas[k])) {
+                continue;
+            }
+            assert_int_equal(umb_ray_map_begin(&other, &a, &frame, UMB_RAY_SLAB, 0.0, 128, umbrae), UMB_OK);
+            draw_bodies(umb_umbra_kernels_get(isas[k]), &other, half);
+            for (uint32_t t = 0; t < scalar.rows * scalar.columns; ++t) {
+                assert_int_equal(scalar.drawn[t], other.drawn[t]);
+                assert_memory_equal(&scalar.summaries[t], &other.summaries[t], sizeof *scalar.summaries);
+                if (scalar.drawn[t]) {
+                    assert_memory_equal(&scalar.intervals[(size_t)t * umbrae], &other.intervals[(size_t)t * umbrae],
+                                        umbrae * sizeof *scalar.intervals);
+                }
+            }
+        }
+        umb_ray_map_free(&scalar, &a);
+        umb_ray_map_free(&other, &a);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_slices),  cmocka_unit_test(test_joins), cmocka_unit_test(test_corners),
+        cmocka_unit_test(test_rays),    cmocka_unit_test(test_kernels),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
