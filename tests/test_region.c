@@ -301,6 +301,218 @@ static void test_mutants(void **state)
     assert_int_equal(bad, 0);
 }
 
+/* ---- cells of every kind ------------------------------------------------------------------------ */
+
+/* Cells that share corners, edges and faces with objects, reach into them, are flat or single points, hold everything or
+ * lie far away. */
+static void test_adversarial_cells(void **state)
+{
+    (void)state;
+    static const char *const names[] = {"gen:city,triangles=5k,seed=3", "gen:building", "gen:boxfield,polygons=2400"};
+    dice d = {91};
+    for (int n = 0; n < 3; ++n) {
+        world w;
+        tally t = {0};
+        open_world(&w, names[n], true);
+        for (uint32_t i = 0; i < (is_small() ? 8u : 40u); ++i) {
+            umb_region_query q = {0};
+            const umb_aabb *b = &w.model->objects[dice_roll(&d, w.model->object_count)].bounds;
+            for (int k = 0; k < 3; ++k) {
+                double size = (double)b->max[k] - b->min[k];
+                uint32_t kind = (i + (uint32_t)k * (i % 3)) % 6;
+                q.min[k] = kind < 2 ? b->max[k] : kind == 2 ? b->min[k] - size : kind == 3 ? b->min[k] + 0.5 * size : b->min[k];
+                q.max[k] = q.min[k] + (kind == 1 || kind == 3 ? 0.0 : kind == 5 ? 40.0 * size : size);
+            }
+            draw_way(&d, &q);
+            ask(&w, &q, 10, &d, &t);
+        }
+        umb_region_query whole = {{-1e4, -1e4, -1e4}, {1e4, 1e4, 1e4}, .resolution = 64}, far = {{1e6, 10, 1e6}, {1e6, 20, 1e6}, .up = UMB_UP_Y};
+        ask(&w, &whole, 2, &d, &t);
+        ask(&w, &far, 2, &d, &t);
+        printf("%-40s %u cells, %u of %u hidden, %u wrong\n", names[n], t.cells, t.hidden, t.objects, t.wrong);
+        close_world(&w);
+        assert_int_equal(t.wrong, 0);
+    }
+}
+
+static void test_two_sided(void **state)
+{
+    (void)state;
+    world w;
+    tally t = {0};
+    umb_error error;
+    dice d = {17};
+    open_model(&w, model_load("gen:city,triangles=5k", &(model_options){.two_sided = true}, &error), true, true);
+    for (uint32_t i = 0; i < (is_small() ? 3u : 20u); ++i) {
+        umb_region_query q = {0};
+        draw_cell(&d, &w.model->bounds, &q);
+        draw_way(&d, &q);
+        ask(&w, &q, 10, &d, &t);
+    }
+    close_world(&w);
+    assert_true(t.hidden > 0);
+    assert_int_equal(t.wrong, 0);
+}
+
+/* What a near plane could cut away hides nothing: sight-lines start ahead of the eye. */
+static void test_near(void **state)
+{
+    (void)state;
+    world w;
+    open_world(&w, "gen:city,triangles=8k", true);
+    umb_region_query q = {{48, 1, 40}, {50, 3, 42}, .resolution = 128};
+    umb_region_answer a;
+    assert_int_equal(umb_region_solve(w.region, &q, &a), UMB_OK);
+    uint32_t without = a.pvs_count;
+    q.near_depth = 5.0;
+    assert_int_equal(umb_region_solve(w.region, &q, &a), UMB_OK);
+    assert_true(a.pvs_count > without);
+    q.near_depth = 1e4;
+    assert_int_equal(umb_region_solve(w.region, &q, &a), UMB_OK);
+    assert_int_equal(a.pvs_count, a.stats.objects);
+    assert_int_equal(a.stats.occluders, 0);
+    close_world(&w);
+}
+
+/* ---- the call ------------------------------------------------------------------------------------- */
+
+static void test_errors(void **state)
+{
+    (void)state;
+    world w;
+    open_world(&w, "gen:blocks,g=3", true);
+    umb_region_answer a;
+    assert_int_equal(umb_region_refine(w.region, 0, &a), UMB_ERROR_STATE);
+    static const umb_region_query bad[] = {
+        {{1, 2, 3}, {0, 4, 5}, .up = UMB_UP_Y},      {{NAN, 0, 0}, {1, 1, 1}, .up = UMB_UP_Y},
+        {{0, 0, 0}, {1, INFINITY, 1}, .up = UMB_UP_Y}, {{0, 0, 0}, {1, 1, 1}, .up = (umb_region_up)7},
+        {{0, 0, 0}, {1, 1, 1}, .resolution = 63},    {{0, 0, 0}, {1, 1, 1}, .resolution = 2049},
+        {{0, 0, 0}, {1, 1, 1}, .umbrae = 9},         {{0, 0, 0}, {1, 1, 1}, .outer = 1.0},
+        {{0, 0, 0}, {1, 1, 1}, .outer = -2.0},       {{0, 0, 0}, {1, 1, 1}, .outer = NAN},
+        {{0, 0, 0}, {1, 1, 1}, .near_depth = -1.0},  {{0, 0, 0}, {1, 1, 1}, .near_depth = NAN}};
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i) {
+        w.error.text[0] = 0;
+        assert_int_equal(umb_region_solve(w.region, &bad[i], &a), UMB_ERROR_ARGUMENT);
+        assert_true(w.error.text[0] != 0);
+        assert_int_equal(a.pvs_count, 0);
+    }
+    assert_int_equal(umb_region_solve(w.region, &(umb_region_query){{0}, {0}, .up = UMB_UP_Y}, &a), UMB_OK);
+    close_world(&w);
+}
+
+static void test_empty(void **state)
+{
+    (void)state;
+    umb_scene *scene;
+    umb_index *index;
+    umb_region *region;
+    umb_region_answer a;
+    assert_int_equal(umb_scene_create(NULL, &scene), UMB_OK);
+    assert_int_equal(umb_scene_commit(scene), UMB_OK);
+    assert_int_equal(umb_index_create(scene, NULL, &index), UMB_OK);
+    assert_int_equal(umb_region_create(index, NULL, &region), UMB_OK);
+    assert_int_equal(umb_region_solve(region, &(umb_region_query){{0}, {1, 1, 1}, .up = UMB_UP_Z}, &a), UMB_OK);
+    assert_int_equal(a.pvs_count, 0);
+    assert_int_equal(umb_region_refine(region, 0, &a), UMB_OK);
+    assert_int_equal(a.refined_count, 0);
+    umb_region_destroy(region);
+    umb_region_destroy(NULL);
+    umb_index_destroy(index);
+    umb_scene_destroy(scene);
+}
+
+static uint64_t hash_of(const uint32_t *ids, uint32_t count)
+{
+    uint64_t h = 1469598103934665603u;
+    for (uint32_t i = 0; i < count; ++i) {
+        h = (h ^ ids[i]) * 1099511628211u;
+    }
+    return h;
+}
+
+/* The same set whatever the instruction set and the threads. */
+static void test_same_everywhere(void **state)
+{
+    (void)state;
+    static const char *const names[] = {"gen:city,triangles=8k", "gen:boxfield,polygons=3000"};
+    umb_pool *pool;
+    assert_int_equal(umb_pool_create(3, &pool), UMB_OK);
+    for (int n = 0; n < 2; ++n) {
+        world w;
+        open_world(&w, names[n], true);
+        umb_region_query q = {{40, 1, 35}, {44, 3, 42}, .resolution = 128, .umbrae = 3};
+        umb_region_answer a;
+        uint64_t first[2] = {0, 0};
+        for (int isa = UMB_ISA_AUTO; isa <= UMB_ISA_NEON; ++isa) {
+            umb_region *region;
+            umb_region_def def = {.isa = (umb_isa)isa, .tasks = isa % 2 == 0 ? umb_pool_tasks(pool) : (umb_tasks){0}};
+            if (!umb_isa_available((umb_isa)isa)) {
+                assert_int_equal(umb_region_create(w.index, &def, &region), UMB_ERROR_ARGUMENT);
+                continue;
+            }
+            assert_int_equal(umb_region_create(w.index, &def, &region), UMB_OK);
+            assert_int_equal(umb_region_solve(region, &q, &a), UMB_OK);
+            assert_int_equal(umb_region_refine(region, 0, &a), UMB_OK);
+            uint64_t now[2] = {hash_of(a.pvs, a.pvs_count), hash_of(a.refined, a.refined_count)};
+            memcpy(first, isa == UMB_ISA_AUTO ? now : first, sizeof first);
+            assert_memory_equal(first, now, sizeof now);
+            umb_region_destroy(region);
+        }
+        printf("golden region_%d %016llx_%016llx\n", n, (unsigned long long)first[0], (unsigned long long)first[1]);
+        close_world(&w);
+    }
+    umb_pool_destroy(pool);
+}
+
+/* Every request of memory fails once: an error comes back, nothing leaks, and the next try works. */
+static void test_memory(void **state)
+{
+    (void)state;
+    failing f;
+    umb_allocator allocator = failing_allocator(&f, 1 << 30);
+    umb_scene *scene;
+    umb_index *index;
+    umb_shape shape;
+    static const float corners[8][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}, {0, 0, 1}, {1, 0, 1}, {0, 1, 1}, {1, 1, 1}};
+    static const uint32_t faces[36] = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4, 2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
+    umb_shape_def def = {.positions = &corners[0][0], .position_count = 8, .indices = faces, .index_count = 33};
+    assert_int_equal(umb_scene_create(&(umb_scene_def){.allocator = allocator}, &scene), UMB_OK);
+    for (uint32_t i = 0; i < 60; ++i) {
+        def.index_count = i % 2 == 0 ? 36 : 33; /* convex, and open */
+        assert_int_equal(umb_scene_add_shape(scene, &def, &shape), UMB_OK);
+        umb_object_def object = {.shape = shape, .flags = UMB_OBJECT_IS_SHAPE,
+                                 .transform = {{{3, 0, 0, 4.0f * (float)(i % 8)}, {0, 3, 0, 0}, {0, 0, 3, 5.0f * (float)(i / 8)}}}};
+        uint32_t id;
+        assert_int_equal(umb_scene_add_object(scene, &object, &id), UMB_OK);
+    }
+    assert_int_equal(umb_scene_commit(scene), UMB_OK);
+    assert_int_equal(umb_index_create(scene, NULL, &index), UMB_OK);
+    long long held = atomic_load(&f.held);
+    umb_region_query q = {{-9, 1, 10}, {-6, 2, 12}, .resolution = 64};
+    bool done = false;
+    for (long long limit = 0; !done; ++limit) {
+        umb_region *region = NULL;
+        umb_region_answer a;
+        atomic_store(&f.left, limit);
+        umb_result result = umb_region_create(index, NULL, &region);
+        result = result == UMB_OK ? umb_region_solve(region, &q, &a) : result;
+        result = result == UMB_OK ? umb_region_refine(region, 0, &a) : result;
+        assert_true(result == UMB_OK || result == UMB_ERROR_MEMORY);
+        done = result == UMB_OK;
+        if (region != NULL && !done) {
+            atomic_store(&f.left, 1 << 30);
+            assert_int_equal(umb_region_solve(region, &q, &a), UMB_OK);
+            assert_int_equal(umb_region_refine(region, 0, &a), UMB_OK);
+        }
+        umb_region_destroy(region);
+        assert_int_equal(atomic_load(&f.held), held);
+    }
+    atomic_store(&f.left, 1 << 30);
+    umb_index_destroy(index);
+    umb_scene_destroy(scene);
+    assert_int_equal(atomic_load(&f.held), 0);
+}
+
 int main(int count, char **words)
 {
     const struct CMUnitTest tests[] = {
@@ -308,6 +520,13 @@ int main(int count, char **words)
         cmocka_unit_test(test_boxfield),
         cmocka_unit_test(test_building),
         cmocka_unit_test(test_blocks),
+        cmocka_unit_test(test_adversarial_cells),
+        cmocka_unit_test(test_two_sided),
+        cmocka_unit_test(test_near),
+        cmocka_unit_test(test_errors),
+        cmocka_unit_test(test_empty),
+        cmocka_unit_test(test_same_everywhere),
+        cmocka_unit_test(test_memory),
         cmocka_unit_test(test_mutants),
     };
     if (count > 1) {
