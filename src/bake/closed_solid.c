@@ -33,26 +33,35 @@ static bool beside(const float (*p)[3], const uint32_t s[3], const uint32_t t[3]
     return !(front && back);
 }
 
-static bool boxes_apart(const float (*p)[3], const uint32_t s[3], const uint32_t t[3])
+typedef struct box {
+    float min[3], max[3];
+} box;
+
+static box box_of(const float (*p)[3], const uint32_t t[3])
 {
+    box b;
     for (int k = 0; k < 3; ++k) {
-        float s_max = fmaxf(p[s[0]][k], fmaxf(p[s[1]][k], p[s[2]][k]));
-        float s_min = fminf(p[s[0]][k], fminf(p[s[1]][k], p[s[2]][k]));
-        float t_max = fmaxf(p[t[0]][k], fmaxf(p[t[1]][k], p[t[2]][k]));
-        float t_min = fminf(p[t[0]][k], fminf(p[t[1]][k], p[t[2]][k]));
-        if (s_max < t_min || t_max < s_min) {
-            return true;
-        }
+        float x = p[t[0]][k], y = p[t[1]][k], z = p[t[2]][k], low = x < y ? x : y, high = x < y ? y : x;
+        b.min[k] = low < z ? low : z;
+        b.max[k] = high > z ? high : z;
     }
-    return false;
+    return b;
+}
+
+static bool boxes_apart(const box *a, const box *b)
+{
+    return a->max[0] < b->min[0] || b->max[0] < a->min[0] || a->max[1] < b->min[1] || b->max[1] < a->min[1] ||
+           a->max[2] < b->min[2] || b->max[2] < a->min[2];
 }
 
 static bool none_cross(const umb_mesh *m, const float (*p)[3])
 {
+    box boxes[UMB_CLOSED_SOLID_MOST];
     for (uint32_t i = 0; i < m->triangle_count; ++i) {
-        for (uint32_t k = i + 1; k < m->triangle_count; ++k) {
+        boxes[i] = box_of(p, m->triangles[i]);
+        for (uint32_t k = 0; k < i; ++k) {
             const uint32_t *s = m->triangles[i], *t = m->triangles[k];
-            if (!boxes_apart(p, s, t) && !beside(p, s, t) && !beside(p, t, s)) {
+            if (!boxes_apart(&boxes[i], &boxes[k]) && !beside(p, s, t) && !beside(p, t, s)) {
                 return false;
             }
         }

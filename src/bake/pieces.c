@@ -382,7 +382,7 @@ static umb_result cut_disks(umb_pieces *s, const umb_occluder *o, bool solid)
     return UMB_OK;
 }
 
-umb_result umb_pieces_cut(umb_pieces *s, const umb_occluder *o)
+umb_result umb_pieces_cut(umb_pieces *s, const umb_occluder *o, uint32_t number)
 {
     const umb_mesh *m = o->mesh;
     bool solid = false;
@@ -395,7 +395,10 @@ umb_result umb_pieces_cut(umb_pieces *s, const umb_occluder *o)
             s->emit(s->user, &s->piece);
             return UMB_OK;
         }
-        solid = separated_by_box(s, o) && umb_closed_solid(o, (const float(*)[3])p);
+        if (s->known[number] == 0) {
+            s->known[number] = umb_closed_solid(o, (const float(*)[3])p) ? UMB_SOLID_YES : UMB_SOLID_NO;
+        }
+        solid = s->known[number] == UMB_SOLID_YES && separated_by_box(s, o);
     }
     return cut_disks(s, o, solid);
 }

@@ -9,6 +9,8 @@
 
 #define UMB_PIECE_TRIANGLES 48
 
+enum { UMB_SOLID_NO = 1, UMB_SOLID_YES = 2 }; /* what umb_closed_solid() said */
+
 /* A piece in world coordinates. */
 typedef struct umb_piece {
     double points[UMB_UMBRA_VERTICES][3];
@@ -26,6 +28,7 @@ typedef struct umb_pieces {
     double reach;               /* no coordinate is larger */
     void (*emit)(void *user, const umb_piece *piece);
     void *user;
+    uint8_t *known; /* per occluder, for all cells: UMB_SOLID_...; 0: not looked at yet */
     umb_piece piece;
     /* Working memory, by triangles of the largest mesh so far. */
     uint32_t (*neighbours)[3];
@@ -34,7 +37,7 @@ typedef struct umb_pieces {
 } umb_pieces;
 
 /* Hand on the pieces of an occluder that block whatever leaves the cell through them. */
-umb_result umb_pieces_cut(umb_pieces *p, const umb_occluder *o);
+umb_result umb_pieces_cut(umb_pieces *p, const umb_occluder *o, uint32_t number);
 void umb_pieces_free(umb_pieces *p);
 
 #endif

@@ -56,6 +56,7 @@ void umb_region_destroy(umb_region *region)
     for (int i = 0; i < UMB_REGION_MAPS; ++i) {
         umb_ray_map_free(&region->maps[i], &a);
     }
+    umb_memory_free(&a, region->known, region->known_capacity);
     umb_memory_free(&a, region->used, region->used_capacity * sizeof *region->used);
     umb_memory_free(&a, region->queue, region->queue_capacity * sizeof *region->queue);
     umb_memory_free(&a, region->pvs, region->pvs_capacity * sizeof *region->pvs);
@@ -160,9 +161,16 @@ static umb_result prepare(umb_region *region, const umb_region_query *query)
     if (!umb_memory_reserve(&region->allocator, (void **)&region->pvs, &region->pvs_capacity, tree->object_count,
                             sizeof *region->pvs) ||
         !umb_memory_reserve(&region->allocator, (void **)&region->refined, &region->refined_capacity,
-                            c->object_count, sizeof *region->refined)) {
+                            c->object_count, sizeof *region->refined) ||
+        !umb_memory_reserve(&region->allocator, (void **)&region->known, &region->known_capacity,
+                            (size_t)c->occluder_count + 1, 1)) {
         return UMB_ERROR_MEMORY;
     }
+    if (region->version != c->version) {
+        memset(region->known, 0, region->known_capacity);
+        region->version = c->version;
+    }
+    region->pieces.known = region->known;
     region->reach = largest(query, tree);
     set_cell(region, query);
     region->solids.count = region->solids.plane_count = 0;

@@ -3,10 +3,11 @@
 
 #include "region_state.h"
 
-/* The interval of a pixel that reaches highest. */
+/* The interval that reaches highest, of a pixel of a copy that is stretched to a square. */
 static void read_pixel(const umb_ray_map *m, uint32_t s, uint32_t t, bool half, umb_region_pixel *out)
 {
-    size_t tile = (size_t)(s / UMB_TILE) * m->tiles + t / UMB_TILE;
+    s = s * m->rows / m->columns;
+    size_t tile = (size_t)(s / UMB_TILE) * m->columns + t / UMB_TILE;
     uint32_t pixel = s % UMB_TILE * UMB_TILE + t % UMB_TILE;
     *out = (umb_region_pixel){.bottom = INFINITY, .top = -INFINITY, .live = (m->live[tile] >> pixel & 1) != 0};
     if (!out->live || !m->drawn[tile]) {
@@ -26,7 +27,7 @@ bool umb_region_read_map(const umb_region *region, uint32_t map, umb_region_pixe
 {
     bool there = region->solved && map < region->map_count;
     const umb_ray_map *m = &region->maps[there ? map : 0];
-    *side = there ? m->tiles * UMB_TILE : 0;
+    *side = there ? m->columns * UMB_TILE : 0;
     if (!there || pixels == NULL || capacity < (size_t)*side * *side) {
         return false;
     }

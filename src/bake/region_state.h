@@ -29,6 +29,9 @@ struct umb_region {
     umb_pieces pieces;
     uint64_t *queue; /* what is waiting: a heap of orders */
     size_t queue_capacity, queue_count;
+    uint8_t *known; /* per occluder of this version of the scene */
+    size_t known_capacity;
+    uint64_t version;
     uint32_t *used; /* occluders that the walk found not hidden */
     size_t used_capacity, used_count;
     umb_solids solids; /* bodies of these, once there is something to refine */

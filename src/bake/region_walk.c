@@ -289,8 +289,9 @@ static umb_result block(umb_region *r, const umb_occluder *o)
     if (!umb_memory_reserve(&r->allocator, (void **)&r->used, &r->used_capacity, r->used_count + 1, sizeof *r->used)) {
         return UMB_ERROR_MEMORY;
     }
-    r->used[r->used_count++] = (uint32_t)(o - umb_scene_committed(umb_index_scene(r->index))->occluders);
-    return umb_pieces_cut(&r->pieces, o);
+    uint32_t number = (uint32_t)(o - umb_scene_committed(umb_index_scene(r->index))->occluders);
+    r->used[r->used_count++] = number;
+    return umb_pieces_cut(&r->pieces, o, number);
 }
 
 /* ---- the walk ------------------------------------------------------------------------------------ */

@@ -201,6 +201,7 @@ static umb_result add_body(umb_solids *s, const inner *in, const face *f, double
     return UMB_OK;
 }
 
+/* The occluder is known to be a solid. */
 static bool begin(inner *in, const umb_solids *s, const umb_occluder *o, const double box[8][3])
 {
     *in = (inner){.occluder = o, .mesh = o->mesh};
@@ -221,7 +222,7 @@ static bool begin(inner *in, const umb_solids *s, const umb_occluder *o, const d
             umb_transform_point(&o->transform, in->mesh->positions[i], in->p[i]);
         }
     }
-    return umb_closed_solid(o, (const float(*)[3])in->p);
+    return true;
 }
 
 umb_result umb_solids_add_inner(umb_solids *s, const umb_occluder *o, uint32_t number, const double box[8][3])
