@@ -1,4 +1,4 @@
-/* What from-region visibility stands on (docs/conservative.md, section 14): T1 and T3 in random slices, T5 with random
+/* What from-region visibility stands on (docs/conservative.md, "From a region"): T1 and T3 in random slices, T5 with random
  * bodies, rays and the maps that have to hold them, kernels equal to the bit. */
 #include <math.h>
 #include <setjmp.h>
