@@ -121,8 +121,8 @@ typedef struct umb_bounds_past {
  *   planes  in: a bit for each plane to test (masking: what the parent's test left); out: those that the volume crosses,
  *           for its children; NULL: all planes
  * Which planes are named and what is remembered change the work alone, as long as planes left out are planes that
- * the volume is inside of. With UMB_BOUNDS_MOTION an answer may be CROSSING where umb_bounds_test() is sure, and is never
- * surer. */
+ * the volume is inside of. Within the bound of rounding an answer may be CROSSING where umb_bounds_test() is sure, and the
+ * other way round; each is a proof. */
 UMB_API umb_place umb_bounds_test_again(const umb_bounds_frustum *f, const umb_volume *v, uint32_t switches,
                                         umb_bounds_past *past, uint16_t *planes);
 
@@ -139,8 +139,7 @@ typedef struct umb_bounds_swept {
 
 /* Sweep a volume along the planes of a frustum. */
 UMB_API void umb_bounds_sweep(umb_bounds_swept *out, const umb_bounds_frustum *f, const umb_volume *v);
-/* The place of the volume moved so that its reference point is at: three dot products at most two comparisons each,
- * whatever the volume. */
+/* The place of the volume moved so that its reference point is `at`. Costs the same for every kind. */
 UMB_API umb_place umb_bounds_test_point(const umb_bounds_swept *s, const double at[3]);
 
 #ifdef __cplusplus
