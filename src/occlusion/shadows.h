@@ -4,7 +4,7 @@
  * A front is a set of triangles that face the viewer, with its boundary, directed edges that have the triangles on one
  * side. In the picture, a place that is strictly inside of every edge of the boundary is covered by some triangle of the
  * front: every edge is seen from there turning the same way, so they turn about it once at least
- * (docs/conservative.md, 12). So the cross-section of the shadow is a convex polygon, whatever the front's shape:
+ * (docs/conservative.md, 15). So the cross-section of the shadow is a convex polygon, whatever the front's shape:
  *
  *     \         /         inside of every edge, beyond every plane of the front's triangles:
  *      \#######/          hidden. Where an outline is not convex, the inside of all its edges is
