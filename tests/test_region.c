@@ -31,6 +31,14 @@ static bool is_small(void)
     return size != NULL && strcmp(size, "small") == 0;
 }
 
+/* How many cells to look from: so many in a normal run. */
+static uint32_t cells(uint32_t small, uint32_t normal)
+{
+    const char *size = getenv("UMBRAGE_TEST_SIZE");
+    bool full = size != NULL && strcmp(size, "full") == 0;
+    return is_small() ? small : full ? 6 * normal : normal;
+}
+
 static double unit(dice *d)
 {
     return dice_roll(d, 1u << 30) / (double)(1u << 30);
@@ -190,7 +198,7 @@ static void run_scene(const char *name, bool weld, uint32_t cells, uint32_t rays
 static void test_city(void **state)
 {
     (void)state;
-    uint32_t n = is_small() ? 2 : 40;
+    uint32_t n = cells(2, 7);
     run_scene("gen:city,triangles=8k", true, n, 20, 1);
     run_scene("gen:city,triangles=8k,seed=5", false, n, 20, 2);
 }
@@ -198,7 +206,7 @@ static void test_city(void **state)
 static void test_boxfield(void **state)
 {
     (void)state;
-    uint32_t n = is_small() ? 2 : 40;
+    uint32_t n = cells(2, 7);
     run_scene("gen:boxfield,polygons=3000", true, n, 20, 3);
     run_scene("gen:boxfield,polygons=6000,seed=9", false, n, 20, 4);
 }
@@ -206,7 +214,7 @@ static void test_boxfield(void **state)
 static void test_building(void **state)
 {
     (void)state;
-    uint32_t n = is_small() ? 1 : 30;
+    uint32_t n = cells(1, 5);
     run_scene("gen:building", true, n, 10, 5);
     run_scene("gen:building", false, n, 10, 6);
 }
@@ -214,7 +222,7 @@ static void test_building(void **state)
 static void test_blocks(void **state)
 {
     (void)state;
-    run_scene("gen:blocks,g=8", true, is_small() ? 2 : 40, 20, 7);
+    run_scene("gen:blocks,g=8", true, cells(2, 7), 20, 7);
 }
 
 /* ---- planted mistakes ------------------------------------------------------------------------- */
@@ -317,7 +325,7 @@ static void test_adversarial_cells(void **state)
         world w;
         tally t = {0};
         open_world(&w, names[n], true);
-        for (uint32_t i = 0; i < (is_small() ? 1u : 40u); ++i) {
+        for (uint32_t i = 0; i < cells(1, 7); ++i) {
             umb_region_query q = {0};
             const umb_aabb *b = &w.model->objects[dice_roll(&d, w.model->object_count)].bounds;
             for (int k = 0; k < 3; ++k) {
