@@ -354,7 +354,7 @@ static void test_two_sided(void **state)
     umb_error error;
     dice d = {17};
     open_model(&w, model_load("gen:city,triangles=5k", &(model_options){.two_sided = true}, &error), true, true);
-    for (uint32_t i = 0; i < (is_small() ? 1u : 20u); ++i) {
+    for (uint32_t i = 0; i < cells(6, 20); ++i) {
         umb_region_query q = {0};
         draw_cell(&d, &w.model->bounds, &q);
         draw_way(&d, &q);
