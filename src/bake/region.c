@@ -158,10 +158,11 @@ static umb_result prepare(umb_region *region, const umb_region_query *query)
     if (tree->version != c->version) {
         return umb_region_fail(region, UMB_ERROR_STATE, "the index could not follow the last commit");
     }
-    if (!umb_memory_reserve(&region->allocator, (void **)&region->pvs, &region->pvs_capacity, tree->object_count,
-                            sizeof *region->pvs) ||
+    /* Room for one at least: no list is NULL, which sorting would not take. */
+    if (!umb_memory_reserve(&region->allocator, (void **)&region->pvs, &region->pvs_capacity,
+                            (size_t)tree->object_count + 1, sizeof *region->pvs) ||
         !umb_memory_reserve(&region->allocator, (void **)&region->refined, &region->refined_capacity,
-                            c->object_count, sizeof *region->refined) ||
+                            (size_t)c->object_count + 1, sizeof *region->refined) ||
         !umb_memory_reserve(&region->allocator, (void **)&region->known, &region->known_capacity,
                             (size_t)c->occluder_count + 1, 1)) {
         return UMB_ERROR_MEMORY;
