@@ -55,10 +55,14 @@ typedef enum umb_index_rule {
     UMB_RULE_BOTTOM_UP = 8
 } umb_index_rule;
 
-/* BSP, as bits. */
+/* As bits. */
 enum {
-    UMB_INDEX_SPLIT = 1u << 0, /* cut triangles in two; else one that is cut is in both halves as a whole */
-    UMB_INDEX_NODES = 1u << 1  /* what lies in a plane stays with the node, between its halves; else it is below */
+    UMB_INDEX_SPLIT = 1u << 0, /* BSP: cut triangles in two; else one that is cut is in both halves as a whole */
+    UMB_INDEX_NODES = 1u << 1, /* BSP: what lies in a plane stays with the node, between its halves; else it is below */
+    /* BVH, one of the two at most: around each node, besides its box, a sphere, or a box turned as what is in it lies; looked
+       at after the box where it is tighter (Gummerus 3.1). It follows what moves, comes and goes, whatever the update */
+    UMB_INDEX_SPHERES = 1u << 2,
+    UMB_INDEX_ORIENTED = 1u << 3
 };
 
 /* How the index follows what moves, comes and goes (Gummerus 3.8). What the frustum holds is found with every one of

@@ -3,6 +3,7 @@
 #include "base/memory.h"
 #include "contribution.h"
 #include "found.h"
+#include "volumes.h"
 
 bool umb_chosen_reserve(umb_chosen_room *room, const umb_allocator *a, const umb_tree *tree)
 {
@@ -127,6 +128,8 @@ void umb_chosen_find(umb_chosen *v)
     }
     while (waiting > 0) {
         umb_chosen_node at = v->room->nodes[--waiting];
-        open_node(v, &at, &waiting);
+        if (tree->volumes == NULL || umb_volumes_in_view(v->choice->frustum, tree, at.number, at.planes)) {
+            open_node(v, &at, &waiting);
+        }
     }
 }

@@ -32,6 +32,7 @@
 #include "occlusion/method.h"
 #include "once.h"
 #include "past.h"
+#include "volumes.h"
 
 /* Images of boxes whose shorter side, in pixels beyond the first, is less than this cover nothing worth having: a
  * silhouette of two pixels across covers one at most, and one with more edges than a box less. */
@@ -607,6 +608,20 @@ static bool found_hidden(walk *w, const umb_waiting *item)
     return hidden(w, &item->image);
 }
 
+/* A node whose box may be seen: its volume, where it has one. */
+static bool volume_shows(walk *w, const umb_waiting *item)
+{
+    const umb_culler *c = w->culler;
+    uint32_t node = item->ref & UMB_REF_NUMBER;
+    if (!umb_volumes_in_view(&w->frustum, w->tree, node, item->planes)) {
+        return false;
+    }
+    umb_asker asker = {c->ops, c->method, c->kernels, &w->projector, &w->map, &w->stats};
+    bool hides = w->drawn != 0 && umb_volumes_hidden(&asker, w->tree, node);
+    w->stats.hidden_nodes += hides;
+    return !hides;
+}
+
 static void run_queue(walk *w)
 {
     umb_heap *heap = &w->culler->heap;
@@ -619,7 +634,9 @@ static void run_queue(walk *w)
         } else if (found_hidden(w, item)) {
             count_hidden(w, item->ref);
         } else if ((item->ref & UMB_REF_KIND) == UMB_REF_NODE) {
-            open_node(w, item->ref & UMB_REF_NUMBER, item->planes);
+            if (w->tree->volumes == NULL || volume_shows(w, item)) {
+                open_node(w, item->ref & UMB_REF_NUMBER, item->planes);
+            }
         } else if ((item->ref & UMB_REF_KIND) == UMB_REF_OCCLUDER) {
             draw(w, item->ref & UMB_REF_NUMBER, NULL, item);
         } else {

@@ -5,6 +5,7 @@
 #include "base/memory.h"
 #include "contribution.h"
 #include "found.h"
+#include "volumes.h"
 
 /* How many nodes ahead of the walk memory is asked for: enough to wait for several at once, few enough for the first
  * cache. */
@@ -130,6 +131,9 @@ void umb_in_view_find(umb_in_view *v)
             fetch(tree, nodes[i + AHEAD].number);
         }
         uint32_t number = nodes[i].number;
+        if (tree->volumes != NULL && !umb_volumes_in_view(&v->frustum, tree, number, nodes[i].planes)) {
+            continue;
+        }
         umb_tree_note_open(tree, number);
         open_node(v, umb_tree_node(tree, number), nodes[i].planes, &v->remember[number], &waiting);
     }

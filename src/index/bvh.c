@@ -1,5 +1,6 @@
 /* The wide half of the build, and refitting. */
 #include "cells.h"
+#include "node_volume.h"
 
 #include <string.h>
 
@@ -422,12 +423,13 @@ static inline uint32_t differ(float a, float b)
 
 /* Bring a marked node's box up to its parent, which is marked when that changes it. By bits, so
  * that the result is that of a full refit to the sign of a zero. */
-static inline void lift(umb_node *nodes, const umb_bvh_marks *marks, uint32_t number)
+static inline void lift(umb_node *nodes, const umb_bvh_marks *marks, umb_node_volumes *volumes, uint32_t number)
 {
     umb_node *node = &nodes[number];
     if (node->count < UMB_NODE_WIDTH) {
         umb_node_pad(node);
     }
+    bool refitted = volumes != NULL && umb_node_volumes_fit(volumes, nodes, number);
     if (node->parent == UMB_NONE) {
         return;
     }
@@ -439,13 +441,13 @@ static inline void lift(umb_node *nodes, const umb_bvh_marks *marks, uint32_t nu
         parent->min[i][slot] = low;
         parent->max[i][slot] = high;
     }
-    if (changed != 0) {
+    if (changed != 0 || refitted) {
         umb_bvh_mark(marks, node->parent);
     }
 }
 
 /* A node marks none but its parent, whose number is lower: a word that is left is done with. */
-void umb_bvh_lift_marked(umb_node *nodes, const umb_bvh_marks *marks)
+void umb_bvh_lift_marked(umb_node *nodes, const umb_bvh_marks *marks, umb_node_volumes *volumes)
 {
     for (size_t w = marks->word_words; w-- > 0;) {
         while (marks->words[w] != 0) {
@@ -453,7 +455,7 @@ void umb_bvh_lift_marked(umb_node *nodes, const umb_bvh_marks *marks)
             while (marks->nodes[n] != 0) {
                 uint32_t bit = highest(marks->nodes[n]);
                 marks->nodes[n] &= ~((uint64_t)1 << bit);
-                lift(nodes, marks, (uint32_t)(n << 6 | bit));
+                lift(nodes, marks, volumes, (uint32_t)(n << 6 | bit));
             }
             marks->words[w] &= ~((uint64_t)1 << (n & 63));
         }
@@ -464,7 +466,7 @@ void umb_bvh_lift_marked(umb_node *nodes, const umb_bvh_marks *marks)
 #define AHEAD 8
 
 void umb_bvh_refit_moved(umb_node *nodes, umb_bvh_marks *marks, const uint32_t *places,
-                         const umb_committed *scene)
+                         const umb_committed *scene, umb_node_volumes *volumes)
 {
     for (uint32_t i = 0; i < scene->moved_count; ++i) {
         uint32_t place = places[scene->moved[i]];
@@ -484,5 +486,5 @@ void umb_bvh_refit_moved(umb_node *nodes, umb_bvh_marks *marks, const uint32_t *
             umb_bvh_mark(marks, place / UMB_NODE_WIDTH);
         }
     }
-    umb_bvh_lift_marked(nodes, marks);
+    umb_bvh_lift_marked(nodes, marks, volumes);
 }

@@ -57,8 +57,10 @@ size_t umb_bvh_marks_memory(const umb_bvh_marks *marks);
 /* Room for more nodes; marks are kept. False without memory. */
 bool umb_bvh_marks_reserve(umb_bvh_marks *marks, const umb_allocator *a, uint32_t node_count);
 void umb_bvh_marks_clear(umb_bvh_marks *marks);
-/* Bring the boxes of marked nodes up to their parents, as far as they change. */
-void umb_bvh_lift_marked(umb_node *nodes, const umb_bvh_marks *marks);
+struct umb_node_volumes;
+
+/* Bring the boxes of marked nodes up to their parents, and fit their volumes (NULL: none), as far as they change. */
+void umb_bvh_lift_marked(umb_node *nodes, const umb_bvh_marks *marks, struct umb_node_volumes *volumes);
 
 static inline void umb_bvh_mark(const umb_bvh_marks *marks, uint32_t node)
 {
@@ -69,7 +71,7 @@ static inline void umb_bvh_mark(const umb_bvh_marks *marks, uint32_t node)
 /* The same as umb_bvh_refit() when only the committed `moved` objects moved: from these up, as far
  * as boxes change, each node once. Costs nothing for nodes that stay as they are. */
 void umb_bvh_refit_moved(umb_node *nodes, umb_bvh_marks *marks, const uint32_t *places,
-                         const umb_committed *scene);
+                         const umb_committed *scene, struct umb_node_volumes *volumes);
 
 /* Make the slots from count on as the layout wants them: slot 0's box, no reference. */
 void umb_node_pad(umb_node *node);

@@ -15,6 +15,7 @@
 struct umb_index {
     umb_tree tree;
     umb_tree_edit edit;    /* what tree.nodes and below point at */
+    umb_node_volumes volumes; /* and tree.volumes, which edit keeps if they are wanted */
     umb_updater updater;
     umb_rebuild_job job;
     umb_order *orders;     /* of the tree as built */
@@ -112,7 +113,7 @@ static umb_result build(const umb_index *index, const umb_committed *scene, umb_
         return umb_grid_build(a, index->def.rule, items, count, out);
     default:
         if (index->def.rule == UMB_RULE_BOTTOM_UP) {
-            return umb_bottom_up_build(a, false, items, count, out);
+            return umb_bottom_up_build(a, index->tree.spheres, items, count, out);
         }
         return umb_bvh_build(a, &index->def.tasks, items, count, out);
     }
@@ -193,6 +194,7 @@ static void show(umb_index *index)
     tree->below = index->edit.below;
     tree->objects = index->objects;
     tree->blocks = index->blocks;
+    tree->volumes = index->volumes.list;
     tree->opened = index->updater.opened;
 }
 
@@ -215,6 +217,7 @@ static void drop(umb_index *index)
     umb_rebuild_job_free(&index->job, a);
     umb_update_free(&index->updater, a);
     umb_tree_edit_free(&index->edit);
+    umb_node_volumes_free(&index->volumes, a);
     umb_memory_free(a, index->orders, index->order_count * sizeof(umb_order));
     umb_memory_free(a, index->planes, index->plane_count * sizeof(umb_tilted_plane));
     umb_memory_free(a, index->objects, index->object_capacity * sizeof(uint32_t));
@@ -291,7 +294,7 @@ static umb_result fill_voxels(umb_index *index, const umb_committed *c, uint32_t
         gather_items(c, items);
         index->updater.voxels = umb_voxels_choose(items, count);
         umb_voxels_build(&index->updater.voxels, e, items, count);
-        umb_bvh_lift_marked(e->nodes, &e->marks);
+        umb_bvh_lift_marked(e->nodes, &e->marks, e->volumes);
         umb_tree_edit_learn(e);
         index->live_count = count - (c->occluder_count - c->first_free_occluder);
         if (e->failed || !furnish(index, e->node_count, e->slot_count, 0)) {
@@ -556,7 +559,9 @@ static umb_result make_empty(umb_scene *scene, const umb_index_def *def, umb_ind
     index->allocator = *a;
     index->def = *def;
     index->tree.flat = def->kind == UMB_INDEX_FLAT;
+    index->tree.spheres = index->volumes.spheres = (def->options & UMB_INDEX_SPHERES) != 0;
     index->edit.allocator = &index->allocator;
+    index->edit.volumes = index->tree.spheres || (def->options & UMB_INDEX_ORIENTED) != 0 ? &index->volumes : NULL;
     bool boxes = def->kind == UMB_INDEX_BVH && def->rule == UMB_RULE_DEFAULT;
     umb_index_update usual = boxes ? UMB_UPDATE_INCREMENTAL : UMB_UPDATE_REFIT;
     index->updater.strategy = def->update != UMB_UPDATE_DEFAULT ? def->update : usual;
@@ -655,7 +660,8 @@ void umb_index_get_stats(const umb_index *index, umb_index_stats *out)
     out->depth = tree_depth(tree);
     out->cost = tree_cost(tree);
     out->bytes = sizeof(*index) + umb_tree_edit_memory(&index->edit) + umb_rebuild_job_memory(&index->job) +
-                 umb_update_memory(&index->updater) + index->order_count * sizeof(umb_order) +
+                 umb_update_memory(&index->updater) + umb_node_volumes_memory(&index->volumes) +
+                 index->order_count * sizeof(umb_order) +
                  index->plane_count * sizeof(umb_tilted_plane) + index->object_capacity * sizeof(uint32_t) +
                  index->block_capacity * sizeof(umb_node);
 }

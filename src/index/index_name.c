@@ -13,6 +13,10 @@ typedef struct variant {
 static const variant variants[] = {
     {"bvh", UMB_INDEX_BVH, UMB_RULE_DEFAULT, 0},
     {"bvh,bottom-up", UMB_INDEX_BVH, UMB_RULE_BOTTOM_UP, 0},
+    {"bvh,spheres", UMB_INDEX_BVH, UMB_RULE_DEFAULT, UMB_INDEX_SPHERES},
+    {"bvh,oriented", UMB_INDEX_BVH, UMB_RULE_DEFAULT, UMB_INDEX_ORIENTED},
+    {"bvh,bottom-up,spheres", UMB_INDEX_BVH, UMB_RULE_BOTTOM_UP, UMB_INDEX_SPHERES},
+    {"bvh,bottom-up,oriented", UMB_INDEX_BVH, UMB_RULE_BOTTOM_UP, UMB_INDEX_ORIENTED},
     {"flat", UMB_INDEX_FLAT, UMB_RULE_DEFAULT, 0},
     {"kdtree", UMB_INDEX_KDTREE, UMB_RULE_DEFAULT, 0},
     {"kdtree,median", UMB_INDEX_KDTREE, UMB_RULE_MEDIAN, 0},

@@ -243,7 +243,7 @@ static bool exchange(umb_rebuild_job *job, umb_tree_edit *e, const umb_committed
     for (uint32_t i = 0; i < job->log_count && !e->failed; ++i) {
         put_right(e, scene, job->log[i]);
     }
-    umb_bvh_lift_marked(e->nodes, &e->marks);
+    umb_bvh_lift_marked(e->nodes, &e->marks, e->volumes);
     return true;
 }
 

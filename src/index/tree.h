@@ -72,6 +72,14 @@ typedef struct umb_tilted_plane {
     float points[3][3];
 } umb_tilted_plane;
 
+/* A volume around what is below a node: a sphere of radius half[0] around place's origin, or the box from -half to half in
+ * place's axes. */
+typedef struct umb_node_volume {
+    umb_transform place;
+    float half[3];
+    uint32_t pays; /* it is tighter than the node's box: worth a look */
+} umb_node_volume;
+
 /* What lies side by side in the list of a tree's objects. */
 typedef struct umb_range {
     uint32_t first, count;
@@ -102,6 +110,8 @@ typedef struct umb_tree {
     /* One a node; NULL: the tree knows no strict order (and after moves that could break it). */
     const umb_order *orders;
     const umb_tilted_plane *planes;
+    const umb_node_volume *volumes; /* one a node; NULL: boxes are all there is */
+    bool spheres;                   /* they are spheres */
     /* Flat: boxes around each eight rows, in blocks like nodes; boxes around each eight of these, and so on to one.
      * They follow the order of the list, whatever that is. Block k has the number node_count + k, in refs and below. */
     const umb_node *blocks;

@@ -67,6 +67,7 @@ static bool reserve_beside(umb_tree_edit *e)
     return umb_memory_reserve(a, (void **)&e->below, &e->below_capacity, nodes, sizeof *e->below) &&
            umb_memory_reserve(a, (void **)&e->next, &e->next_capacity, next, sizeof *e->next) &&
            umb_bvh_marks_reserve(&e->marks, a, (uint32_t)nodes) &&
+           (e->volumes == NULL || umb_node_volumes_reserve(e->volumes, a, nodes)) &&
            umb_number_set_reserve(&e->free, a, (uint32_t)nodes);
 }
 
@@ -448,6 +449,9 @@ bool umb_tree_edit_close_gaps(umb_tree_edit *e, umb_number_set *set)
             e->nodes[node.parent].ref[node.slot] = next;
         }
         to[k].first = next;
+        if (e->volumes != NULL) {
+            e->volumes->list[next] = e->volumes->list[k];
+        }
         e->nodes[next++] = node;
     }
     renumber_set(set, e, to);
@@ -526,6 +530,9 @@ bool umb_tree_edit_adopt(umb_tree_edit *e, umb_node *nodes, uint32_t node_count,
     e->stale = 0;
     e->failed = false;
     umb_tree_edit_learn(e);
+    if (e->volumes != NULL) {
+        umb_node_volumes_fit_all(e->volumes, nodes, node_count);
+    }
     return true;
 }
 

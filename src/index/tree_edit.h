@@ -8,7 +8,7 @@
 #define UMB_TREE_EDIT_H
 
 #include "base/number_set.h"
-#include "bvh.h"
+#include "node_volume.h"
 
 /* In umb_node.edits: the node is in the list of worn ones. */
 #define UMB_EDITS_WORN 0x80000000u
@@ -22,6 +22,7 @@ typedef struct umb_tree_edit {
     umb_number_set free; /* node numbers */
     umb_bvh_marks marks;
     umb_range *below;
+    umb_node_volumes *volumes; /* NULL: none are wanted */
     uint32_t *places;          /* of each object: 8 * node + slot, the first of them */
     uint32_t *occluder_places; /* of each stand-alone occluder, by number */
     uint32_t *next;            /* places of items that have several (umb_bvh_find_places); NULL: none has */

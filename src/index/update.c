@@ -141,7 +141,7 @@ static void move_all(umb_updater *u, umb_tree_edit *e, const umb_committed *scen
 {
     bool refits = u->strategy == UMB_UPDATE_REFIT || u->strategy == UMB_UPDATE_INCREMENTAL;
     if (refits && e->next == NULL) {
-        umb_bvh_refit_moved(e->nodes, &e->marks, e->places, scene);
+        umb_bvh_refit_moved(e->nodes, &e->marks, e->places, scene, e->volumes);
         return;
     }
     for (uint32_t i = 0; i < scene->moved_count && !e->failed; ++i) {
@@ -256,7 +256,7 @@ bool umb_update_follow(umb_updater *u, umb_tree_edit *e, const umb_committed *sc
     if (e->failed || !umb_update_reserve(u, e)) {
         return false;
     }
-    umb_bvh_lift_marked(e->nodes, &e->marks);
+    umb_bvh_lift_marked(e->nodes, &e->marks, e->volumes);
     if (umb_tree_edit_close_gaps(e, &u->raised) && u->opened_capacity > 0) {
         memset(u->opened, 0, u->opened_capacity * sizeof *u->opened);
     }
