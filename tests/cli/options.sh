@@ -50,6 +50,19 @@ remembered
 remembered --coherence none
 remembered --coherence list,hierarchy
 remembered --coherence all --occluder-budget 3
+# However the index follows what moves, the frustum holds the same.
+moved() {
+    "$umbrage" walk gen:blocks,g=8 --path gen:blocks,g=8 --to 20 --moving 0.3,20 --step 0.2 --method none --json "$@" |
+        jq -c '.frames[] | [.visible, .hash]'
+}
+moved >followed
+for way in refit delete-insert lca lazy deepest incremental; do
+    moved --update $way >way
+    same "--update $way" followed way
+done
+moved --update overlapping --index grid >way
+same "--update overlapping" followed way
+"$umbrage" walk gen:blocks,g=8 --path gen:blocks,g=8 --to 0 --update lca --index octree,loose --json | jq -c '.frames[] | [.index, .update]'
 "$umbrage" info gen:city,triangles=5k,seed=3 --json | jq -c '[.objects,.triangles,.bounds]' >seed_key
 "$umbrage" info gen:city,triangles=5k --seed 3 --json | jq -c '[.objects,.triangles,.bounds]' >seed_option
 same "--seed and seed=" seed_key seed_option

@@ -74,6 +74,9 @@ run cull $scene $view --min-pixels -1
 run cull $scene $view --method hzb
 run cull $scene $view --index heap
 run cull $scene $view --index kdtree,sah
+run cull $scene $view --update often
+run cull $scene $view --index flat --update lca
+run walk $scene --path gen:blocks --update overlapping --index grid,nested
 run cull $scene $view --isa mmx
 run cull $scene $view --threads 0
 run cull $scene $view --threads 257

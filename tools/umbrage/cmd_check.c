@@ -254,6 +254,7 @@ static int print_json(const check *c, const setup *s, const options *o, bool is_
     json_text_string(&j, "method", umb_method_name(o->method));
     json_text_string(&j, "class", umb_class_name(c->views[0].frame.class_));
     json_text_string(&j, "index", umb_index_name(&o->index));
+    json_text_string(&j, "update", umb_index_update_name(o->index.update));
     json_text_count(&j, "objects", s->model->object_count);
     json_text_count(&j, "views", c->count);
     json_text_count(&j, "in_frustum", in_frustum);

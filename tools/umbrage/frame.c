@@ -116,6 +116,7 @@ void frame_json(const frame *f, json_text *j)
     json_text_string(j, "method", umb_method_name(f->method));
     json_text_string(j, "class", umb_class_name(f->class_));
     json_text_string(j, "index", umb_index_name(&f->index));
+    json_text_string(j, "update", umb_index_update_name(f->index.update));
     json_text_count(j, "objects", f->objects);
     json_text_count(j, "in_frustum", f->in_frustum);
     json_text_count(j, "visible", f->stats.visible);

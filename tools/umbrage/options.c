@@ -273,6 +273,13 @@ static const char *read_index(options *o, const char *text)
     return names;
 }
 
+static const char *read_update(options *o, const char *text)
+{
+    return umb_index_update_parse(text, &o->update)
+               ? NULL
+               : "one of default, refit, delete-insert, lca, lazy, deepest, incremental, overlapping";
+}
+
 static const char *read_isa(options *o, const char *text)
 {
     static const char *const names[] = {"auto", "scalar", "sse4", "avx2", "neon"};
@@ -489,6 +496,7 @@ static const option_spec specs[] = {
 
     {"method", 0, VIEWS, "NAME", read_method, "raster; planes, shadow-frusta, occlusion-tree: large occluders; none: frustum only (default raster)"},
     {"index", 0, SCENES, "NAME", read_index, "bvh, flat, kdtree, octree, quadtree, bsp, grid: how objects are found (default bvh)"},
+    {"update", 0, SCENES, "NAME", read_update, "how the index follows what moves: refit, delete-insert, lca, lazy, deepest, incremental, overlapping"},
     {"buffer", 0, VIEWS, "WxH", read_buffer, "the method's own raster (default 1024x288)"},
     {"coherence", 0, MANY_VIEWS, "NAMES", read_coherence,
      "carry over: list, hierarchy, propagation, conservative, rest, planes, all (default none)"},
@@ -604,6 +612,17 @@ static void set_defaults(const command *c, options *out)
                      .pictures = PICTURE_EYE};
 }
 
+/* --update and --index come in any order. */
+static int choose_update(options *out)
+{
+    out->index.update = out->update;
+    if (umb_index_can_update(&out->index)) {
+        return EXIT_DONE;
+    }
+    return fail(out, EXIT_USAGE, "--update %s: index %s cannot follow what moves this way", umb_index_update_name(out->update),
+                umb_index_name(&out->index));
+}
+
 int options_read(const command *c, int which, int word_count, char **words, options *out, bool *help)
 {
     bool only_inputs = false;
@@ -647,7 +666,7 @@ int options_read(const command *c, int which, int word_count, char **words, opti
         return fail(out, EXIT_USAGE, "needs a %s: umbrage %s %s %s", c->input, c->name, c->input,
                     c->usage);
     }
-    return EXIT_DONE;
+    return choose_update(out);
 }
 
 void options_help(const command *c, int which)

@@ -46,6 +46,7 @@ typedef struct options {
 
     umb_method method;
     umb_index_def index;
+    umb_index_update update; /* index.update too, once all is read */
     umb_isa isa;
     uint32_t coherence, occluder_budget; /* umb_culler_def */
     uint32_t threads, repeat;
