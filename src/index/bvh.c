@@ -421,6 +421,15 @@ static inline uint32_t differ(float a, float b)
     return x ^ y;
 }
 
+/* Inline: GCC finds that the function has no effect, and drops calls to it. */
+static inline __attribute__((always_inline)) void fetch(const umb_node *nodes, uint32_t number)
+{
+    const char *p = (const char *)&nodes[number != UMB_NONE ? number : 0];
+    for (size_t i = 0; i < sizeof(umb_node); i += 64) {
+        __builtin_prefetch(p + i, 1);
+    }
+}
+
 /* Bring a marked node's box up to its parent, which is marked when that changes it. By bits, so
  * that the result is that of a full refit to the sign of a zero. */
 static inline void lift(umb_node *nodes, const umb_bvh_marks *marks, umb_node_volumes *volumes, uint32_t number)
@@ -443,6 +452,7 @@ static inline void lift(umb_node *nodes, const umb_bvh_marks *marks, umb_node_vo
     }
     if (changed != 0 || refitted) {
         umb_bvh_mark(marks, node->parent);
+        fetch(nodes, parent->parent); /* its turn is later */
     }
 }
 
@@ -470,13 +480,13 @@ void umb_bvh_refit_moved(umb_node *nodes, umb_bvh_marks *marks, const uint32_t *
 {
     for (uint32_t i = 0; i < scene->moved_count; ++i) {
         uint32_t place = places[scene->moved[i]];
+        if (i + 2 * AHEAD < scene->moved_count) {
+            __builtin_prefetch(&places[scene->moved[i + 2 * AHEAD]]);
+            __builtin_prefetch(&scene->objects[scene->moved[i + 2 * AHEAD]].bounds);
+        }
         if (i + AHEAD < scene->moved_count) {
             uint32_t next = places[scene->moved[i + AHEAD]];
-            const umb_node *node = &nodes[next != UMB_NONE ? next / UMB_NODE_WIDTH : 0];
-            __builtin_prefetch(node->min, 1);
-            __builtin_prefetch(node->min[2], 1);
-            __builtin_prefetch(node->max[1], 1);
-            __builtin_prefetch(node->ref, 1);
+            fetch(nodes, next != UMB_NONE ? next / UMB_NODE_WIDTH : 0);
         }
         if (place != UMB_NONE) {
             const umb_aabb *box = &scene->objects[scene->moved[i]].bounds;
@@ -484,6 +494,7 @@ void umb_bvh_refit_moved(umb_node *nodes, umb_bvh_marks *marks, const uint32_t *
             uint32_t slot = place % UMB_NODE_WIDTH;
             set_slot(node, slot, box->min, box->max, node->ref[slot]);
             umb_bvh_mark(marks, place / UMB_NODE_WIDTH);
+            fetch(nodes, node->parent);
         }
     }
     umb_bvh_lift_marked(nodes, marks, volumes);

@@ -4,10 +4,11 @@
 
 /* A new tree is begun when boxes have grown by so much, and no earlier. */
 #define BEGIN_GROWTH 1.15
-/* One node in so many is looked at each commit, others each time; no more than a few for each change, so that a commit
- * costs what it changes. */
+/* One node in so many is looked at each commit, others each time; no more than one for so many changes, so that a commit
+ * costs what it changes: in a large tree each node looked at is one to wait for. */
 #define SAMPLE 16
 #define LEAST_SAMPLE 64
+#define CHANGES_A_SAMPLE 8
 /* The work is done in about so many commits, but for small trees. */
 #define COMMITS 24
 #define LEAST_WORK 8192
@@ -42,12 +43,10 @@ void umb_rebuild_job_drop(umb_rebuild_job *job)
 
 /* ---- how good the tree is ------------------------------------------------------------------- */
 
-/* What a random ray pays for some of the nodes, over what it paid when they were built. */
-static double sample_growth(const umb_tree_edit *e, uint32_t phase, uint64_t most)
+/* What a random ray pays for one node in so many, over what it paid when they were built. */
+static double sample_growth(const umb_tree_edit *e, uint32_t phase, uint32_t step)
 {
     double now = 0.0, then = 0.0;
-    uint32_t step = (uint32_t)(e->node_count / most) + 1;
-    step = step > SAMPLE ? step : SAMPLE;
     for (uint32_t k = phase % step; k < e->node_count; k += step) {
         const umb_node *node = &e->nodes[k];
         if (node->count > 0) {
@@ -62,9 +61,12 @@ double umb_rebuild_job_watch(umb_rebuild_job *job, const umb_tree_edit *e, const
 {
     if (scene->moved_count > 0 || structure) {
         uint64_t changes = (uint64_t)scene->moved_count + (structure ? scene->came_count + scene->went_count : 0);
+        uint32_t step = (uint32_t)(e->node_count / (LEAST_SAMPLE + changes / CHANGES_A_SAMPLE)) + 1;
+        step = step > SAMPLE ? step : SAMPLE;
         job->phase += 7919; /* a prime: all nodes have their turn */
-        double growth = sample_growth(e, job->phase, LEAST_SAMPLE + changes);
-        job->growth += isfinite(growth) ? (growth - job->growth) / 2.0 : 0.0;
+        double growth = sample_growth(e, job->phase, step);
+        /* A smaller sample says as much less. */
+        job->growth += isfinite(growth) ? (growth - job->growth) * SAMPLE / (2.0 * step) : 0.0;
     }
     return job->growth;
 }

@@ -239,11 +239,38 @@ static umb_result commit_structure(umb_scene *scene)
     return UMB_OK;
 }
 
+/* How many moves ahead memory is asked for. */
+#define AHEAD 8
+
+/* Inline: GCC finds that the function has no effect, and drops calls to it. */
+static inline __attribute__((always_inline)) void fetch(const umb_scene *scene, uint32_t i)
+{
+    if (i + 2 * AHEAD < scene->touched_count) {
+        uint32_t id = scene->touched[i + 2 * AHEAD];
+        const char *slot = (const char *)&scene->objects[id];
+        const umb_object *object = &scene->committed_objects[id];
+        __builtin_prefetch(slot, 1);
+        __builtin_prefetch(slot + 64, 1);
+        __builtin_prefetch(slot + sizeof(umb_object_slot) - 1, 1);
+        __builtin_prefetch(object, 1);
+        __builtin_prefetch((const char *)(object + 1) - 1, 1);
+    }
+    if (i + AHEAD < scene->touched_count) {
+        uint32_t occluder = scene->committed_objects[scene->touched[i + AHEAD]].occluder;
+        if (occluder != UMB_NONE) {
+            const umb_occluder *o = &scene->committed_occluders[occluder];
+            __builtin_prefetch(o, 1);
+            __builtin_prefetch((const char *)(o + 1) - 1, 1);
+        }
+    }
+}
+
 /* Only what a move changes. */
 static void commit_moved(umb_scene *scene)
 {
     uint32_t count = 0;
     for (uint32_t i = 0; i < scene->touched_count; ++i) {
+        fetch(scene, i);
         umb_object_slot *slot = &scene->objects[scene->touched[i]];
         const umb_placement *p = &slot->placement;
         umb_object *object = &scene->committed_objects[scene->touched[i]];
