@@ -1,11 +1,17 @@
-/* Every index by every rule over the same boxes: what building takes, what it holds, and what culling costs, without
- * occlusion and with it, as a table in Markdown. At last the default beside Embree's hierarchy over the same boxes.
+/* Every index by every rule over the same boxes: what building takes, what it holds, what culling costs without occlusion and
+ * with it, and what following motion costs; as rows of a table in Markdown. And the default beside Embree's hierarchy over the
+ * same boxes.
  *
- *     bench_index [MOST [ROUNDS [SET]]]
+ *     bench_index [MOST [ROUNDS [SET [INDEX]]]]
+ *     bench_index only COUNT ROUNDS SET INDEX
+ *     bench_index embree COUNT ROUNDS SET
  *
- * MOST: the largest number of objects (1000, 10000, 100000 or 1000000; default 100000). SET: uniform or clustered; without
- * it, both. All objects are boxes that hide. Times are processor time, of one thread, the least of the rounds; culling is
- * the mean over 32 views. BSP trees have twelve triangles an object, so they stop at 100,000 objects.
+ * MOST: the largest number of objects (1000, 10000, 100000 or 1000000; default 100000). SET: uniform, clustered or both. INDEX: a
+ * name, or all; with "only", of one number of objects, and without the table's head. All objects are boxes that hide. Times are
+ * processor time, of one thread, the least of the rounds; culling is the mean over 32 views. Following: a share of the objects
+ * goes up to a fifth of a unit along each axis before each frame; the mean over the second half of the frames of the commit and of
+ * the cull after it, without occlusion. BSP trees have twelve triangles an object, so they stop at 100,000 objects.
+ * scripts/index-report makes docs/results/index.md of it.
  */
 #include <embree3/rtcore.h>
 #include <math.h>
@@ -147,28 +153,122 @@ static bool measure(umb_scene *scene, const char *name, const umb_view views[VIE
     return ok;
 }
 
-static bool measure_all(uint32_t count, bool clustered, int rounds)
+/* ---- motion --------------------------------------------------------------------------------- */
+
+enum { MOST_FRAMES = 60, LEAST_FRAMES = 8, SHARES = 3 };
+
+static const uint32_t SHARE[SHARES] = {10, 50, 100}; /* percent that moves */
+
+/* The first ones of each hundred objects take a step, each its own way, back and forth in turns of 32. */
+static bool step(umb_scene *scene, uint32_t count, uint32_t percent, uint32_t frame)
+{
+    bool ok = true;
+    for (uint32_t i = 0; i < count && ok; ++i) {
+        umb_transform t = {{{0}}};
+        umb_aabb box; /* of a unit cube: its scale and its place */
+        if (i % 100 >= percent) {
+            continue;
+        }
+        uint64_t seed = 1 + i * (uint64_t)0x9E3779B97F4A7C15u;
+        ok = umb_scene_object_bounds(scene, i, &box);
+        for (int a = 0; a < 3; ++a) {
+            double by = 0.4 * dice(&seed) - 0.2;
+            t.m[a][a] = box.max[a] - box.min[a];
+            t.m[a][3] = box.min[a] + (float)(frame / 32 % 2 == 0 ? by : -by);
+        }
+        ok = ok && umb_scene_move_object(scene, i, &t, NULL) == UMB_OK;
+    }
+    return ok;
+}
+
+typedef struct following {
+    double update_ms, cull_ms;
+} following;
+
+/* The scene is where it was when this ends, but for what rounding does. */
+static bool follow(umb_scene *scene, const umb_index_def *def, const umb_view views[VIEWS], uint32_t percent, following *out)
+{
+    umb_index *index = NULL;
+    umb_culler *culler = NULL;
+    umb_culler_def none = {.method = UMB_METHOD_NONE, .unordered = true};
+    uint32_t count = umb_scene_object_count(scene), frames = 0;
+    double update[MOST_FRAMES], cull[MOST_FRAMES], begun = now_ms();
+    bool ok = umb_index_create(scene, def, &index) == UMB_OK && umb_culler_create(index, &none, &culler) == UMB_OK;
+    while (ok && frames < MOST_FRAMES && (frames < LEAST_FRAMES || now_ms() - begun < 2000.0)) {
+        umb_visible_set seen;
+        ok = step(scene, count, percent, frames);
+        double begin = now_ms();
+        ok = ok && umb_scene_commit(scene) == UMB_OK;
+        double middle = now_ms();
+        ok = ok && umb_cull(culler, &views[frames % VIEWS], &seen) == UMB_OK;
+        cull[frames] = now_ms() - middle;
+        update[frames++] = middle - begin;
+    }
+    *out = (following){0.0, 0.0};
+    for (uint32_t f = frames / 2; f < frames; ++f) {
+        out->update_ms += update[f] / (frames - frames / 2);
+        out->cull_ms += cull[f] / (frames - frames / 2);
+    }
+    umb_culler_destroy(culler);
+    umb_index_destroy(index);
+    return ok;
+}
+
+/* ---- a table -------------------------------------------------------------------------------- */
+
+static void print_head(uint32_t count, bool clustered)
+{
+    printf("\n%u objects, %s\n\n| index | build ms | MiB | slots an object | nodes | cost | frustum ms | in frustum | raster ms | "
+           "reported |", count, clustered ? "clustered" : "uniform");
+    for (int k = 0; k < SHARES; ++k) {
+        printf(" %u %%: update + cull ms |", SHARE[k]);
+    }
+    printf(" rebuild + cull over it |\n|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n");
+}
+
+static bool print_row(umb_scene *scene, const char *name, const umb_view views[VIEWS], int rounds)
+{
+    figures f;
+    following moving[SHARES];
+    umb_index_def def = {0};
+    bool ok = umb_index_parse(name, &def) && measure(scene, name, views, rounds, &f);
+    for (int k = 0; k < SHARES && ok; ++k) {
+        ok = follow(scene, &def, views, SHARE[k], &moving[k]);
+    }
+    if (!ok) {
+        return false;
+    }
+    printf("| %s | %.2f | %.2f | %.2f | %u | %.1f | %.4f | %.0f | %.4f | %.1f |", name, f.build_ms,
+           (double)f.stats.bytes / 1048576.0, f.stats.slots / (double)f.stats.items, f.stats.nodes, f.stats.cost,
+           f.frustum_ms, f.in_frustum, f.raster_ms, f.visible);
+    for (int k = 0; k < SHARES; ++k) {
+        printf(" %.3g + %.3g |", moving[k].update_ms, moving[k].cull_ms);
+    }
+    const following *all = &moving[SHARES - 1];
+    printf(" %.1f |\n", (f.build_ms + f.frustum_ms) / (all->update_ms + all->cull_ms));
+    (void)fflush(stdout);
+    return true;
+}
+
+static bool is_wanted(const char *name, uint32_t count, const char *wanted)
+{
+    bool fits = count <= MOST_TRIANGLES || strncmp(name, "bsp", 3) != 0;
+    return fits && (strcmp(wanted, "all") == 0 || strcmp(wanted, name) == 0);
+}
+
+/* wanted: an index, or all. */
+static bool measure_all(uint32_t count, bool clustered, int rounds, const char *wanted, bool head)
 {
     umb_view views[VIEWS];
     double reach;
     umb_scene *scene = make_scene(count, clustered, &reach);
     bool ok = scene != NULL && make_views(reach, views);
     const char *name;
-    printf("\n%u objects, %s\n\n| index | build ms | MiB | slots an object | nodes | cost | frustum ms | in frustum | "
-           "raster ms | reported |\n|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n",
-           count, clustered ? "clustered" : "uniform");
+    if (head) {
+        print_head(count, clustered);
+    }
     for (uint32_t k = 0; (name = umb_index_variant(k)) != NULL && ok; ++k) {
-        figures f;
-        if (count > MOST_TRIANGLES && strncmp(name, "bsp", 3) == 0) {
-            continue;
-        }
-        ok = measure(scene, name, views, rounds, &f);
-        if (ok) {
-            printf("| %s | %.2f | %.2f | %.2f | %u | %.1f | %.4f | %.0f | %.4f | %.1f |\n", name, f.build_ms,
-                   (double)f.stats.bytes / 1048576.0, f.stats.slots / (double)f.stats.items, f.stats.nodes,
-                   f.stats.cost, f.frustum_ms, f.in_frustum, f.raster_ms, f.visible);
-            (void)fflush(stdout);
-        }
+        ok = !is_wanted(name, count, wanted) || print_row(scene, name, views, rounds);
     }
     umb_scene_destroy(scene);
     return ok;
@@ -329,26 +429,65 @@ static bool compare(RTCDevice device, uint32_t count, bool clustered, int rounds
     return ok;
 }
 
-int main(int argc, char **argv)
+/* ---- the command line ----------------------------------------------------------------------- */
+
+static void print_embree_head(void)
 {
-    uint32_t most = argc > 1 ? (uint32_t)strtoul(argv[1], NULL, 10) : 100000;
-    int rounds = argc > 2 ? atoi(argv[2]) : 3;
-    const char *set = argc > 3 ? argv[3] : "";
-    bool ok = most >= 1000 && rounds > 0;
-    for (uint32_t count = 1000; count <= most && ok; count *= 10) {
-        for (int clustered = 0; clustered < 2 && ok; ++clustered) {
-            if (*set == '\0' || strcmp(set, clustered != 0 ? "clustered" : "uniform") == 0) {
-                ok = measure_all(count, clustered != 0, rounds);
-            }
-        }
-    }
-    RTCDevice device = rtcNewDevice("threads=1,set_affinity=0");
     printf("\nThe default beside Embree's hierarchy of user geometry, medium quality, one thread\n\n| objects | set | ms | "
            "Embree ms | ratio | cost | Embree's cost | ratio |\n|--:|---|--:|--:|--:|--:|--:|--:|\n");
-    for (uint32_t count = 1000; count <= most && ok; count *= 10) {
-        ok = compare(device, count, false, rounds) && compare(device, count, true, rounds);
+}
+
+static bool is_set(const char *set, bool clustered)
+{
+    return strcmp(set, "both") == 0 || strcmp(set, clustered ? "clustered" : "uniform") == 0;
+}
+
+/* Both sets, or the one named. */
+static bool compare_sets(uint32_t count, int rounds, const char *set)
+{
+    RTCDevice device = rtcNewDevice("threads=1,set_affinity=0");
+    bool ok = true;
+    for (int clustered = 0; clustered < 2 && ok; ++clustered) {
+        ok = !is_set(set, clustered != 0) || compare(device, count, clustered != 0, rounds);
     }
     rtcReleaseDevice(device);
+    return ok;
+}
+
+static bool measure_sets(uint32_t count, int rounds, const char *set, const char *wanted, bool head)
+{
+    bool ok = true;
+    for (int clustered = 0; clustered < 2 && ok; ++clustered) {
+        ok = !is_set(set, clustered != 0) || measure_all(count, clustered != 0, rounds, wanted, head);
+    }
+    return ok;
+}
+
+static const char *word(int argc, char **argv, int k, const char *otherwise)
+{
+    return argc > k ? argv[k] : otherwise;
+}
+
+int main(int argc, char **argv)
+{
+    bool only = argc > 1 && strcmp(argv[1], "only") == 0, embree = argc > 1 && strcmp(argv[1], "embree") == 0;
+    int from = only || embree ? 2 : 1, rounds = atoi(word(argc, argv, from + 1, "3"));
+    uint32_t most = (uint32_t)strtoul(word(argc, argv, from, "100000"), NULL, 10);
+    const char *set = word(argc, argv, from + 2, "both"), *wanted = word(argc, argv, from + 3, "all");
+    bool ok = most >= 1000 && rounds > 0 && (is_set(set, false) || is_set(set, true));
+    if (only) {
+        ok = ok && measure_sets(most, rounds, set, wanted, false);
+    } else if (embree) {
+        ok = ok && compare_sets(most, rounds, set);
+    } else {
+        for (uint32_t count = 1000; count <= most && ok; count *= 10) {
+            ok = measure_sets(count, rounds, set, wanted, true);
+        }
+        print_embree_head();
+        for (uint32_t count = 1000; count <= most && ok; count *= 10) {
+            ok = compare_sets(count, rounds, set);
+        }
+    }
     if (!ok) {
         (void)fprintf(stderr, "bench_index: no memory, or no such number\n");
     }
