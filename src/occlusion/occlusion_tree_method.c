@@ -1,6 +1,5 @@
 /* The method "occlusion-tree": the chosen occluders' shadows, merged, and boxes filtered down the tree. A token is the
  * node that a box was asked down to: what lies in the box need not be asked from higher up. */
-#include <math.h>
 #include <string.h>
 
 #include "base/memory.h"
@@ -50,15 +49,6 @@ static void destroy(void *state)
     umb_memory_free(&a, m, sizeof *m);
 }
 
-static double reach_of(const umb_aabb *b)
-{
-    double reach = 0.0;
-    for (int k = 0; k < 3; ++k) {
-        reach = fmax(reach, fmax(fabs((double)b->min[k]), fabs((double)b->max[k])));
-    }
-    return reach;
-}
-
 static bool reserve(method *m, uint32_t budget)
 {
     uint32_t tries = TRIES * budget, fronts = FRONTS_EACH * tries + 16, edges = EDGES_EACH * tries + 64;
@@ -92,7 +82,7 @@ static umb_result choose(void *state, const umb_choice *choice)
     if (!reserve(m, budget) || umb_select_begin(&m->selector, choice, m->kernels) != UMB_OK) {
         return UMB_ERROR_MEMORY;
     }
-    umb_shadow_viewer_prepare(&m->shadows.viewer, choice->view, reach_of(&choice->tree->bounds));
+    umb_shadow_viewer_prepare(&m->shadows.viewer, choice->view, umb_select_reach(choice));
     umb_shadows_clear(&m->shadows);
     umb_occlusion_tree_begin(&m->tree, &m->shadows, true);
     for (uint32_t tries = 0; tries < TRIES * budget && taken < budget; ++tries) {

@@ -25,6 +25,7 @@ typedef struct seen {
     uint8_t alive;  /* hides a part of the box, as far as one can see */
     uint8_t behind; /* all of the box is beyond its surface, on sight-lines that meet it beyond near */
     uint8_t full;   /* and on the inner side of each edge */
+    bool closely;   /* behind and in are known of boxes that are not alive, too */
     uint8_t in[UMB_BLOCKER_EDGES];
 } seen;
 
@@ -258,6 +259,7 @@ static bool look_by_tangents(planes *p, const umb_query *q, const umb_near_boxes
     out->alive = (uint8_t)(q->mask & ~gone & ~front);
     out->behind = (uint8_t)(behind & ~gone);
     out->full = (uint8_t)full;
+    out->closely = false;
     return out->alive != 0;
 }
 
@@ -283,31 +285,60 @@ static bool look(const planes *p, const umb_query *q, const umb_near_boxes *boxe
     out->alive = (uint8_t)(q->mask & ~gone & ~front);
     out->behind = (uint8_t)(behind & out->alive);
     out->full = (uint8_t)(full & out->alive);
+    out->closely = false;
     return out->alive != 0;
+}
+
+/* Of a blocker that hides nothing of some box by itself, but has an edge in common with one that does. */
+static void look_closely(const planes *p, const umb_query *q, const umb_near_boxes *boxes, uint32_t blocker, seen *out)
+{
+    const umb_blocker *k = &p->blockers.list[blocker];
+    uint32_t edge_spaces = k->edge_count * p->blockers.viewer.point_count, front = 0;
+    umb_sides sides[UMB_BLOCKER_EDGES * 8 + 2 * UMB_BLOCKER_PLANES];
+    p->kernels->sides(boxes, &p->blockers.spaces[k->first_space], edge_spaces + k->plane_count + k->near_count, 0, q->mask,
+                      sides);
+    (void)see_edges(p, q->boxes, k, sides, q->mask, out);
+    out->behind = (uint8_t)see_planes(p, q->boxes, k, sides + edge_spaces, q->mask, &front);
+    out->blocker = (uint16_t)blocker;
+    out->closely = true;
+}
+
+/* Where a blocker is in seen[], with what is known of it and a box. */
+static uint32_t find_seen(planes *p, const umb_query *q, const umb_near_boxes *boxes, uint32_t blocker, uint32_t slot)
+{
+    uint32_t at = p->seen_of[blocker];
+    if (at >= p->seen_count || p->seen[at].blocker != blocker) {
+        at = p->seen_of[blocker] = (uint16_t)p->seen_count++;
+        p->seen[at] = (seen){.blocker = (uint16_t)blocker};
+    }
+    seen *s = &p->seen[at];
+    if (!s->closely && (s->alive >> slot & 1u) == 0) {
+        look_closely(p, q, boxes, blocker, s);
+    }
+    return at;
 }
 
 /* The blockers that are joined over the edges which a box crosses, from one of them on: hidden when no edge is left
  * that it crosses. */
-static bool hidden_together(planes *p, uint32_t start, uint32_t slot)
+static bool hidden_together(planes *p, const umb_query *q, const umb_near_boxes *boxes, uint32_t start, uint32_t slot)
 {
     uint16_t todo[MOST_TOGETHER];
     uint32_t count = 0, bit = 1u << slot;
     todo[count++] = (uint16_t)start;
     for (uint32_t i = 0; i < count; ++i) {
-        const seen *s = &p->seen[todo[i]];
-        const umb_blocker *k = &p->blockers.list[s->blocker];
-        if ((s->behind & bit) == 0) {
+        const umb_blocker *k = &p->blockers.list[p->seen[todo[i]].blocker];
+        if ((p->seen[todo[i]].behind & bit) == 0) {
             return false;
         }
         for (uint32_t e = 0; e < k->edge_count; ++e) {
-            uint32_t beyond = p->blockers.edges[k->first_edge + e].beyond, at, j = 0;
-            if ((s->in[e] & bit) != 0) {
+            uint32_t beyond = p->blockers.edges[k->first_edge + e].beyond, j = 0;
+            if ((p->seen[todo[i]].in[e] & bit) != 0) {
                 continue;
             }
-            at = beyond != UMB_NONE ? p->seen_of[beyond] : UMB_NONE;
-            if (at >= p->seen_count || p->seen[at].blocker != beyond) {
+            if (beyond == UMB_NONE) {
                 return false;
             }
+            uint32_t at = find_seen(p, q, boxes, beyond, slot);
             while (j < count && todo[j] != at) {
                 ++j;
             }
@@ -324,17 +355,17 @@ static bool hidden_together(planes *p, uint32_t start, uint32_t slot)
     return true;
 }
 
-static uint32_t find_together(planes *p, uint32_t mask)
+static uint32_t find_together(planes *p, const umb_query *q, const umb_near_boxes *boxes, uint32_t mask)
 {
-    uint32_t hidden = 0;
-    for (uint32_t i = 0; i < p->seen_count; ++i) {
-        const seen *s = &p->seen[i];
-        if (!p->blockers.list[s->blocker].joined) {
+    uint32_t hidden = 0, count = p->seen_count;
+    for (uint32_t i = 0; i < count; ++i) {
+        if (!p->blockers.list[p->seen[i].blocker].joined) {
             continue;
         }
-        for (uint32_t left = s->behind & mask & ~hidden; left != 0; left &= left - 1) {
+        uint32_t left = p->seen[i].behind & p->seen[i].alive & mask & ~hidden;
+        for (; left != 0; left &= left - 1) {
             uint32_t slot = (uint32_t)__builtin_ctz(left);
-            hidden |= hidden_together(p, i, slot) ? 1u << slot : 0;
+            hidden |= hidden_together(p, q, boxes, i, slot) ? 1u << slot : 0;
         }
     }
     return hidden;
@@ -380,7 +411,7 @@ static void ask(void *state, umb_query *q)
         p->hidden[s->blocker] += (uint32_t)__builtin_popcount(s->full & ~hidden);
         hidden |= s->full;
     }
-    hidden |= find_together(p, q->mask & ~hidden);
+    hidden |= find_together(p, q, &boxes, q->mask & ~hidden);
     q->hidden = hidden;
     p->arena_top = q->token + 1 + list[0];
     for (uint32_t left = q->mask & ~hidden; left != 0; left &= left - 1) {

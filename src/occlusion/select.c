@@ -14,6 +14,16 @@
 #define FULL_ANGLE 12.6f
 #define LONGEST_REST 8
 
+double umb_select_reach(const umb_choice *choice)
+{
+    const umb_aabb *b = &choice->tree->bounds;
+    double reach = 0.0;
+    for (int k = 0; k < 3; ++k) {
+        reach = fmax(reach, fmax(fabs((double)b->min[k]), fabs((double)b->max[k])));
+    }
+    return reach;
+}
+
 void umb_selector_create(umb_selector *s, const umb_allocator *a)
 {
     memset(s, 0, sizeof *s);
@@ -50,9 +60,10 @@ void umb_selector_free(umb_selector *s)
 
 /* ---- what there is --------------------------------------------------------------------------- */
 
+/* A body that stands alone is one, whoever made it. */
 static bool is_welded(const umb_occluder *o)
 {
-    return o->owner == UMB_NONE && o->identity && !o->moves;
+    return o->owner == UMB_NONE && o->identity && !o->moves && !o->mesh->convex;
 }
 
 /* The surfaces that stand in world coordinates, as one: equal positions are one vertex, equal triangles one. */

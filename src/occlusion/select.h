@@ -71,6 +71,9 @@ typedef struct umb_selector {
     bool failed; /* no memory for candidates: some were left out */
 } umb_selector;
 
+/* No coordinate of what a frame looks at is larger. */
+double umb_select_reach(const umb_choice *choice);
+
 void umb_selector_create(umb_selector *s, const umb_allocator *a);
 void umb_selector_free(umb_selector *s);
 

@@ -10,7 +10,6 @@
 #include "select.h"
 #include "shape_hull.h"
 
-#include <math.h>
 #include <string.h>
 
 #define CHOSEN 64
@@ -122,15 +121,6 @@ static void prefer_past(frusta *f)
     }
 }
 
-static double reach_of(const umb_aabb *b)
-{
-    double reach = 0.0;
-    for (int k = 0; k < 3; ++k) {
-        reach = fmax(reach, fmax(fabs((double)b->min[k]), fabs((double)b->max[k])));
-    }
-    return reach;
-}
-
 static umb_result choose(void *state, const umb_choice *choice)
 {
     frusta *f = state;
@@ -146,7 +136,7 @@ static umb_result choose(void *state, const umb_choice *choice)
     if (result != UMB_OK || !umb_blockers_begin(&f->blockers, &f->allocator, &choice->viewer, most)) {
         return UMB_ERROR_MEMORY;
     }
-    umb_shadow_viewer_prepare(&f->viewer, choice->view, reach_of(&choice->tree->bounds));
+    umb_shadow_viewer_prepare(&f->viewer, choice->view, umb_select_reach(choice));
     find_candidates(f, most);
     umb_power_sample(&f->power, choice, f->box_kernels, f->kernels, &f->blockers);
     bool past = (choice->coherence & UMB_COHERENCE_LIST) != 0;
