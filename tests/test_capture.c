@@ -89,6 +89,7 @@ static frame make_frame(dice *d, int boxes, umb_method method, umb_index_kind ki
                               .transform = random_place(d, 30.0f, fixed),
                               .flags = fixed ? UMB_OBJECT_STATIC : 0};
         def.flags |= dice_roll(d, 2) != 0 ? UMB_OBJECT_IS_SHAPE : 0;
+        def.mask = dice_roll(d, 4) == 0 ? 1 + dice_roll(d, 3) : 0;
         if (def.shape == 0) {
             def.flags = 0;
             for (int k = 0; k < 3; ++k) {
@@ -102,6 +103,7 @@ static frame make_frame(dice *d, int boxes, umb_method method, umb_index_kind ki
         umb_transform t = random_place(d, 30.0f, false);
         assert_int_equal(umb_scene_add_occluder(f.scene, shapes[1 + dice_roll(d, 3)], &t, &id),
                          UMB_OK);
+        assert_int_equal(umb_scene_mask_occluder(f.scene, id, dice_roll(d, 4)), UMB_OK);
     }
     umb_weld_def weld = {.cluster_triangles = 40};
     assert_int_equal(umb_scene_weld(f.scene, &weld, NULL), UMB_OK);
@@ -155,6 +157,9 @@ static umb_view random_view(dice *d)
     }
     v.min_pixels = dice_roll(d, 4) == 0 ? 3.0 : 0.0;
     v.time = 12.5;
+    v.mask = dice_roll(d, 4);
+    v.mask_all = dice_roll(d, 2) == 0;
+    v.masked_hide = dice_roll(d, 2) == 0;
     return v;
 }
 
@@ -183,6 +188,8 @@ static void test_round_trip(void **state)
         frame f = make_frame(&d, 20 + (int)dice_roll(&d, 150), method, kind, NULL);
         for (int k = 0; k < 3; ++k) {
             umb_view view = random_view(&d);
+            uint32_t few[3] = {0xFFFF00FFu, 0x0FFF7FFFu, 0xFFFFFFFFu};
+            assert_int_equal(umb_culler_set_candidates(f.culler, k == 1 ? few : NULL, k == 1 ? 70 : 0), UMB_OK);
             umb_visible_set seen, again;
             assert_int_equal(umb_cull(f.culler, &view, &seen), UMB_OK);
             size_t size, size_again;

@@ -114,6 +114,8 @@ typedef struct umb_cull_stats {
                               a fuzzy one */
     uint32_t hidden_movers; /* moving objects that nobody had to ask for */
     uint32_t tests;        /* occluders held against a node's boxes, by methods that choose them first */
+    uint32_t left_out;     /* objects not reported because the view's mask or the candidates leave them out, of those that
+                              were met; where an index holds objects in parts, a part may count for itself */
 } umb_cull_stats;
 
 /* The answer. Borrowed: valid until the culler's next call. */
@@ -131,6 +133,13 @@ typedef struct umb_visible_set {
 UMB_API umb_result umb_culler_create(const umb_index *index, const umb_culler_def *def, umb_culler **out);
 /* NULL is allowed. */
 UMB_API void umb_culler_destroy(umb_culler *culler);
+
+/* From now on report only candidates: objects whose bit is set, bit i % 32 of word i / 32 for object i; those from object_count
+ * on are none. A set that is potentially visible, say, or what a query is about. Copied. bits NULL: all objects, as in the
+ * beginning. What is no candidate hides as ever: an answer is that without candidates, less what is none. To ask
+ * about a world without some objects give them masks (umb_view.mask). Errors: no memory; nothing has changed then. Cost: a
+ * copy here; a look at a bit for each object found in each umb_cull. */
+UMB_API umb_result umb_culler_set_candidates(umb_culler *culler, const uint32_t *bits, uint32_t object_count);
 
 /* Answer one view. Allocates only when the scene or the raster has grown since the last call. Safe
  * direction: may report a hidden object visible; never the reverse, provided every object's bounds

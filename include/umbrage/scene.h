@@ -62,6 +62,8 @@ typedef struct umb_object_def {
     umb_shape shape;    /* 0: has bounds only and never hides anything */
     umb_transform transform; /* of the shape; all zero: the identity */
     uint32_t flags;     /* UMB_OBJECT_* */
+    uint32_t mask;      /* the layers that it is in, one a bit, for umb_view.mask; 0: in all of them */
+    uint32_t tag;       /* the caller's own word about it: umb_scene_object_tag() */
 } umb_object_def;
 
 UMB_API umb_result umb_scene_create(const umb_scene_def *def, umb_scene **out);
@@ -86,6 +88,13 @@ UMB_API umb_result umb_scene_place_object(umb_scene *scene, uint32_t object, con
 /* Replace the UMB_OBJECT_* flags of an object: hide it for a time (IGNORED), or let it hide nothing while it is open
  * (NEVER_HIDES). Dissolves welds as moving does. */
 UMB_API umb_result umb_scene_flag_object(umb_scene *scene, uint32_t object, uint32_t flags);
+/* Put an object into other layers (umb_object_def.mask), together with what it hides, from the next commit on, whose work
+ * is that of a move. Dissolves welds as moving does, if the mask is another. */
+UMB_API umb_result umb_scene_mask_object(umb_scene *scene, uint32_t object, uint32_t mask);
+/* Give an object another tag, at once. The library never looks at tags. */
+UMB_API umb_result umb_scene_tag_object(umb_scene *scene, uint32_t object, uint32_t tag);
+/* The tag of an object; 0 for ids that are not in use. */
+UMB_API uint32_t umb_scene_object_tag(const umb_scene *scene, uint32_t object);
 /* Take an object out. Dissolves welds as moving does. */
 UMB_API umb_result umb_scene_remove_object(umb_scene *scene, uint32_t object);
 
@@ -97,6 +106,10 @@ UMB_API umb_result umb_scene_remove_occluder(umb_scene *scene, uint32_t occluder
 /* Let a hand-made occluder hide nothing while it is open, as a door does; it keeps its number. From the next commit on, whose
  * work is that of one change. */
 UMB_API umb_result umb_scene_open_occluder(umb_scene *scene, uint32_t occluder, bool open);
+
+/* Put a hand-made occluder into layers (umb_view.mask), from the next commit on; without, it is in all of them. Safe direction:
+ * it must lie inside what is drawn for every view that it is in. */
+UMB_API umb_result umb_scene_mask_occluder(umb_scene *scene, uint32_t occluder, uint32_t mask);
 
 /* Move the origin by shift: what was at x is at x - shift, and umb_scene_get_origin() grows by shift. For worlds so large that
  * floats far from the origin are too coarse: keep it near the viewer. At once for calls, at the next commit for readers;
@@ -138,7 +151,7 @@ typedef struct umb_weld_stats {
  * once, triangles face to face are dropped, vertices that lie exactly on an edge split it. Then
  * surfaces that are exactly flat are made of fewer triangles, which cover the very same points.
  * What a welded occluder covers is a subset of what its objects' blocking triangles cover, plus
- * nothing. Objects that touch no other keep hiding by their own shape. Call it after the static
+ * nothing. Objects that touch no other keep hiding by their own shape; objects of different masks are not joined. Call it after the static
  * objects are in; calling it again redoes the work. Takes effect at the next commit. stats may be
  * NULL. */
 UMB_API umb_result umb_scene_weld(umb_scene *scene, const umb_weld_def *def, umb_weld_stats *stats);

@@ -52,6 +52,12 @@ typedef struct umb_view {
     uint32_t plane_count;
     double planes[UMB_MAX_CLIP_PLANES][4];
     double time; /* seconds, finite: objects that move by themselves are seen where they are then (motion.h) */
+    /* Layers: the view is of objects and occluders whose mask (umb_object_def.mask) shares a bit with this one, or with
+       mask_all has all of its bits; 0: of all. What is left out is never reported, and hides nothing: nothing is hidden that
+       could be seen if it were not there. With masked_hide it hides as ever, for those who ask about one layer of what
+       is all drawn: answers are then those of the view without a mask, less what is left out. */
+    uint32_t mask;
+    bool mask_all, masked_hide;
 } umb_view;
 
 /* Conventions of a matrix that umb_view_from_matrix() is given. */

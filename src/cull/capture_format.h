@@ -6,19 +6,20 @@
 #include <stdint.h>
 
 #define UMB_CAPTURE_MAGIC "UMBCAP\r\n" /* a transfer as text destroys the line end */
-#define UMB_CAPTURE_VERSION 3u
+#define UMB_CAPTURE_VERSION 4u
 
 /* Sections in the order of the file and the bytes of a record of each. */
 #define UMB_CAPTURE_SECTIONS(X) \
-    X(FRAME, 560)               \
+    X(FRAME, 568)               \
     X(MESHES, 8)                \
     X(POSITIONS, 12)            \
     X(TRIANGLES, 12)            \
     X(FLAGS, 1)                 \
-    X(OBJECTS, 80)              \
-    X(OCCLUDERS, 52)            \
+    X(OBJECTS, 84)              \
+    X(OCCLUDERS, 56)            \
     X(NODES, 32)                \
     X(BOXES, 192)               \
+    X(CANDIDATES, 4)            \
     X(ANSWER, 4)
 
 enum {
@@ -38,6 +39,13 @@ enum {
     UMB_CAPTURE_IS_SHAPE = 1u << 2,
     UMB_CAPTURE_HIDES = 1u << 3,
     UMB_CAPTURE_MARKS = (1u << 4) - 1
+};
+
+/* Marks of a view. */
+enum {
+    UMB_CAPTURE_MASK_ALL = 1u << 0,
+    UMB_CAPTURE_MASKED_HIDE = 1u << 1,
+    UMB_CAPTURE_VIEW_MARKS = (1u << 2) - 1
 };
 
 static inline uint32_t umb_capture_record_bytes(int section)

@@ -109,7 +109,9 @@ static umb_result check_sections(loader *l)
     }
     if (end != l->size || l->counts[UMB_CAPTURE_FRAME] != 1 ||
         l->counts[UMB_CAPTURE_FLAGS] != l->counts[UMB_CAPTURE_TRIANGLES] ||
-        (l->counts[UMB_CAPTURE_BOXES] != 0 && l->counts[UMB_CAPTURE_BOXES] != l->counts[UMB_CAPTURE_NODES])) {
+        (l->counts[UMB_CAPTURE_BOXES] != 0 && l->counts[UMB_CAPTURE_BOXES] != l->counts[UMB_CAPTURE_NODES]) ||
+        (l->counts[UMB_CAPTURE_CANDIDATES] != 0 &&
+         l->counts[UMB_CAPTURE_CANDIDATES] != (l->counts[UMB_CAPTURE_OBJECTS] + 31) / 32)) {
         return fail(l, "sections that do not belong together");
     }
     return UMB_OK;
@@ -119,7 +121,7 @@ static umb_result read_frame(loader *l)
 {
     umb_view *v = &l->out->view;
     double numbers[8];
-    uint32_t words[8];
+    uint32_t words[10];
     l->at = l->sections[UMB_CAPTURE_FRAME];
     get_doubles(l, l->origin, 3);
     get_doubles(l, v->eye, 3);
@@ -129,7 +131,7 @@ static umb_result read_frame(loader *l)
     get_doubles(l, v->vertical, 3);
     get_doubles(l, numbers, 8);
     get_doubles(l, v->planes[0], 4 * UMB_MAX_CLIP_PLANES);
-    for (int i = 0; i < 8; ++i) {
+    for (int i = 0; i < 10; ++i) {
         words[i] = get_word(l);
     }
     v->x_min = numbers[0];
@@ -150,6 +152,12 @@ static umb_result read_frame(loader *l)
     v->buffer_width = words[5];
     v->buffer_height = words[6];
     v->plane_count = words[7];
+    v->mask = words[8];
+    v->mask_all = (words[9] & UMB_CAPTURE_MASK_ALL) != 0;
+    v->masked_hide = (words[9] & UMB_CAPTURE_MASKED_HIDE) != 0;
+    if ((words[9] & ~(uint32_t)UMB_CAPTURE_VIEW_MARKS) != 0) {
+        return fail(l, "unknown marks of the view");
+    }
     return umb_view_check(v, NULL) == UMB_OK ? UMB_OK : fail(l, "an impossible view");
 }
 
@@ -224,9 +232,10 @@ static umb_result read_object(loader *l)
     def.transform = get_transform(l);
     bool known = get_shape(l, &def.shape);
     uint32_t marks = get_word(l), id = UMB_NONE;
+    def.mask = get_word(l);
     bool used = (marks & UMB_CAPTURE_USED) != 0;
     if (!known || (marks & ~(uint32_t)UMB_CAPTURE_MARKS) != 0 ||
-        (!used && (marks != 0 || def.shape != 0))) {
+        (!used && (marks != 0 || def.shape != 0 || def.mask != 0))) {
         return UMB_ERROR_FORMAT;
     }
     def.flags = (marks & UMB_CAPTURE_LIVE) != 0 ? 0 : UMB_OBJECT_IGNORED;
@@ -256,6 +265,8 @@ static umb_result read_scene(loader *l)
         uint32_t id;
         (void)get_shape(l, &shape); /* an occluder without a shape is refused below */
         result = umb_scene_add_occluder(l->out->scene, shape, &transform, &id);
+        uint32_t mask = get_word(l);
+        result = result == UMB_OK ? umb_scene_mask_occluder(l->out->scene, id, mask) : result;
         if (result != UMB_OK) {
             return fail_call(l, result, "occluders");
         }
@@ -314,6 +325,21 @@ static umb_result read_answer(loader *l)
     return UMB_OK;
 }
 
+static umb_result read_candidates(loader *l, umb_scratch *scratch)
+{
+    uint32_t count = l->counts[UMB_CAPTURE_CANDIDATES];
+    uint32_t *bits = umb_scratch_get(scratch, count, sizeof *bits);
+    if (bits == NULL) {
+        return fail_call(l, UMB_ERROR_MEMORY, "candidates");
+    }
+    l->at = l->sections[UMB_CAPTURE_CANDIDATES];
+    for (uint32_t i = 0; i < count; ++i) {
+        bits[i] = get_word(l);
+    }
+    umb_result result = umb_culler_set_candidates(l->out->culler, bits, l->counts[UMB_CAPTURE_OBJECTS]);
+    return result == UMB_OK ? UMB_OK : fail_call(l, result, "candidates");
+}
+
 static umb_result load(loader *l, umb_scratch *scratch)
 {
     umb_result result = check_header(l);
@@ -340,7 +366,10 @@ static umb_result load(loader *l, umb_scratch *scratch)
         return umb_error_set(l->error, result, "capture: instruction set %s is not available here",
                              umb_isa_name(l->isa));
     }
-    return result == UMB_OK ? UMB_OK : fail_call(l, result, "culler");
+    if (result != UMB_OK) {
+        return fail_call(l, result, "culler");
+    }
+    return l->counts[UMB_CAPTURE_CANDIDATES] > 0 ? read_candidates(l, scratch) : UMB_OK;
 }
 
 umb_result umb_capture_load(const void *bytes, size_t size, umb_isa isa, umb_tasks tasks,

@@ -18,6 +18,8 @@ typedef struct saver {
     const umb_view *view;
     const uint32_t *answer;
     uint32_t answer_count;
+    const uint32_t *candidates; /* bits, or NULL */
+    uint32_t candidate_count;
     const umb_mesh **meshes; /* all that objects and occluders name, by first use */
     uint32_t mesh_count;
     uint32_t *table; /* hash table of mesh numbers */
@@ -110,6 +112,8 @@ static void lay_out(saver *s)
                                        s->committed->first_free_occluder;
     s->counts[UMB_CAPTURE_NODES] = s->tree->node_count;
     s->counts[UMB_CAPTURE_BOXES] = s->tree->several ? s->tree->node_count : 0;
+    s->candidates = umb_culler_candidates(s->culler, &s->candidate_count);
+    s->counts[UMB_CAPTURE_CANDIDATES] = s->candidates != NULL ? ((uint64_t)s->committed->object_count + 31) / 32 : 0;
     s->counts[UMB_CAPTURE_ANSWER] = s->answer_count;
     s->size = UMB_CAPTURE_HEADER;
     for (int k = 0; k < UMB_CAPTURE_SECTION_COUNT; ++k) {
@@ -135,15 +139,18 @@ static void put_frame(saver *s)
         static const double none[4] = {0, 0, 0, 0};
         put_doubles(s, i < v->plane_count ? v->planes[i] : none, 4);
     }
-    const uint32_t words[8] = {(uint32_t)umb_culler_settings(s->culler).method,
+    uint32_t marks = (v->mask_all ? UMB_CAPTURE_MASK_ALL : 0u) | (v->masked_hide ? UMB_CAPTURE_MASKED_HIDE : 0u);
+    const uint32_t words[10] = {(uint32_t)umb_culler_settings(s->culler).method,
                                umb_index_name_pack(&index),
                                (uint32_t)v->projection,
                                v->width,
                                v->height,
                                v->buffer_width,
                                v->buffer_height,
-                               v->plane_count};
-    for (int i = 0; i < 8; ++i) {
+                               v->plane_count,
+                               v->mask,
+                               marks};
+    for (int i = 0; i < 10; ++i) {
         put_word(s, words[i]);
     }
 }
@@ -212,11 +219,24 @@ static void put_objects(saver *s, uint8_t *bytes)
         put_word(s, (o->used ? UMB_CAPTURE_USED : 0u) | (o->live ? UMB_CAPTURE_LIVE : 0u) |
                         (o->refine ? UMB_CAPTURE_IS_SHAPE : 0u) |
                         (o->occluder != UMB_NONE ? UMB_CAPTURE_HIDES : 0u));
+        put_word(s, o->mask);
     }
     s->at = bytes + s->offsets[UMB_CAPTURE_OCCLUDERS];
     for (uint32_t i = c->first_free_occluder; i < c->occluder_count; ++i) {
         put_transform(s, &c->occluders[i].transform);
         put_word(s, s->table[find_mesh(s, c->occluders[i].mesh)]);
+        put_word(s, c->occluder_masks[i]);
+    }
+}
+
+/* Of all objects; those beyond the set are none. */
+static void put_candidates(saver *s)
+{
+    uint32_t objects = s->committed->object_count, count = s->candidate_count < objects ? s->candidate_count : objects;
+    for (uint32_t i = 0; i < s->counts[UMB_CAPTURE_CANDIDATES]; ++i) {
+        uint32_t first = 32 * i, left = count > first ? count - first : 0;
+        uint32_t known = left >= 32 ? ~0u : (1u << left) - 1u;
+        put_word(s, left > 0 ? s->candidates[i] & known : 0);
     }
 }
 
@@ -244,6 +264,8 @@ static void put_all(saver *s, uint8_t *bytes)
     for (uint32_t n = 0; n < s->counts[UMB_CAPTURE_BOXES]; ++n) {
         put_boxes(s, &s->tree->nodes[n]);
     }
+    s->at = bytes + s->offsets[UMB_CAPTURE_CANDIDATES];
+    put_candidates(s);
     s->at = bytes + s->offsets[UMB_CAPTURE_ANSWER];
     for (uint32_t i = 0; i < s->answer_count; ++i) {
         put_word(s, s->answer[i]);
@@ -266,7 +288,7 @@ umb_result umb_capture_save(const umb_culler *culler, void *bytes, size_t capaci
     if (s.view == NULL) {
         return umb_error_set(
             umb_culler_settings(culler).error, UMB_ERROR_STATE,
-            "nothing to capture: no view has been answered since the scene changed");
+            "nothing to capture: no view has been answered since the scene or the candidates changed");
     }
     const umb_index *index = umb_culler_index(culler);
     s.scene = umb_index_scene(index);

@@ -21,6 +21,7 @@
 #include "chosen.h"
 #include "contribution.h"
 #include "detail.h"
+#include "filter.h"
 #include "found.h"
 #include "frustum/box_kernels.h"
 #include "frustum/frustum.h"
@@ -61,6 +62,7 @@ struct umb_culler {
     umb_past past;
     umb_once once;
     umb_movers movers;
+    umb_filter filter;
     uint32_t count;
     bool answered;
     umb_view view;    /* of the last answer */
@@ -77,6 +79,7 @@ typedef struct walk {
     umb_projector projector;
     const umb_view *view;
     umb_once *once; /* NULL: each item has one slot */
+    const umb_filter *present; /* NULL: nothing is left out of the walk */
     float most_w;
     uint32_t drawn;
     umb_cull_stats stats;
@@ -141,6 +144,7 @@ void umb_culler_destroy(umb_culler *c)
     umb_past_free(&c->past, &a);
     umb_once_free(&c->once, &a);
     umb_movers_end(&c->movers, umb_index_scene(c->index), &a);
+    umb_filter_free(&c->filter, &a);
     umb_in_view_free(&c->room, &a);
     umb_chosen_free(&c->chosen_room, &a);
     umb_memory_free(&a, c->found, c->found_capacity * sizeof *c->found);
@@ -357,6 +361,9 @@ static void open_boxes(walk *w, opening *o)
     uint32_t outside = umb_frustum_test_node(&w->frustum, c->kernels, boxes, o->planes, o->remember, o->child_planes);
     uint32_t left = ~outside & ((1u << boxes->count) - 1u);
     w->stats.boxes += boxes->count;
+    if (w->present != NULL) {
+        left = umb_filter_present(w->present, boxes, left, &w->stats);
+    }
     if (left == 0) {
         return;
     }
@@ -693,6 +700,9 @@ static void meet_expired(void *user, uint32_t mover)
     expired_movers *e = user;
     walk *w = e->w;
     uint32_t object = w->scene->motion.objects[mover];
+    if (w->present != NULL && !umb_filter_has(w->present, object)) {
+        return;
+    }
     umb_posed *p = umb_movers_meet(&w->culler->movers, object, true, &w->stats);
     if (p == NULL) {
         return;
@@ -854,7 +864,8 @@ static umb_result find_chosen(walk *w)
                          .tree = w->tree,
                          .budget = c->def.occluder_budget,
                          .coherence = c->def.coherence,
-                         .stats = &w->stats};
+                         .stats = &w->stats,
+                         .mask = c->filter.hides ? (umb_mask){0, false} : c->filter.mask};
     umb_result result = c->ops->choose(c->method, &choice);
     if (result != UMB_OK) {
         return result;
@@ -900,6 +911,42 @@ static void write_answer(umb_culler *c)
     }
 }
 
+/* Drop what the view's mask and the candidates leave out. */
+static void leave_out(walk *w)
+{
+    umb_culler *c = w->culler;
+    bool entries = c->ops != NULL || !c->def.unordered;
+    uint32_t left = entries ? umb_filter_entries(&c->filter, c->found, c->count)
+                            : umb_filter_ids(&c->filter, c->objects, c->inside, c->count);
+    w->stats.left_out += c->count - left;
+    w->stats.in_frustum -= c->ops == NULL ? c->count - left : 0;
+    c->count = left;
+}
+
+/* Once the walk has ended: from what was found to what is answered. */
+static void finish(walk *w)
+{
+    umb_culler *c = w->culler;
+    bool filters = umb_filter_on(&c->filter);
+    if (w->once != NULL) {
+        make_whole(w);
+    }
+    if (filters) {
+        leave_out(w);
+    }
+    if (w->scene->motion.count > 0 && (c->ops == NULL || chooses(c))) {
+        settle_movers(w);
+        if (filters) { /* those whose volumes did not hold came by themselves */
+            leave_out(w);
+        }
+    }
+    if (c->ops != NULL || !c->def.unordered) {
+        write_answer(c);
+    }
+    w->stats.visible = c->count;
+    w->stats.hidden_movers = w->scene->motion.count > 0 ? umb_movers_hidden(&c->movers) : 0;
+}
+
 umb_result umb_cull(umb_culler *c, const umb_view *view, umb_visible_set *out)
 {
     memset(out, 0, sizeof *out);
@@ -919,6 +966,7 @@ umb_result umb_cull(umb_culler *c, const umb_view *view, umb_visible_set *out)
     w.scene = umb_movers_begin(&c->movers, &c->allocator, w.scene, view->time, c->ops != NULL);
     bool ready = w.scene != NULL && reserve(c, view, w.tree, w.scene);
     if (ready) {
+        w.present = umb_filter_begin(&c->filter, view, w.scene);
         prepare_walk(&w, c, view);
         ready = c->ops == NULL || (chooses(c) ? find_chosen(&w) : c->ops->prepare(c->method, &w.map, w.scene)) == UMB_OK;
         ready = ready && (!umb_past_on(&c->past) ||
@@ -936,17 +984,7 @@ umb_result umb_cull(umb_culler *c, const umb_view *view, umb_visible_set *out)
     } else if (c->ops == NULL) {
         find_in_view(&w);
     }
-    if (w.once != NULL) {
-        make_whole(&w);
-    }
-    if (w.scene->motion.count > 0 && (c->ops == NULL || chooses(c))) {
-        settle_movers(&w);
-    }
-    if (c->ops != NULL || !c->def.unordered) {
-        write_answer(c);
-    }
-    w.stats.visible = c->count;
-    w.stats.hidden_movers = w.scene->motion.count > 0 ? umb_movers_hidden(&c->movers) : 0;
+    finish(&w);
     c->view = *view;
     c->version = w.scene->version;
     c->answered = true;
@@ -957,6 +995,15 @@ umb_result umb_cull(umb_culler *c, const umb_view *view, umb_visible_set *out)
                   : c->ops != NULL       ? c->ops->class_
                                          : UMB_CLASS_STRICT;
     out->stats = w.stats;
+    return UMB_OK;
+}
+
+umb_result umb_culler_set_candidates(umb_culler *c, const uint32_t *bits, uint32_t object_count)
+{
+    if (!umb_filter_restrict(&c->filter, &c->allocator, bits, object_count)) {
+        return umb_error_set(c->def.error, UMB_ERROR_MEMORY, "no memory for candidates");
+    }
+    c->answered = false; /* what a capture would hold is not what was asked */
     return UMB_OK;
 }
 
@@ -1019,6 +1066,12 @@ const umb_coverage *umb_culler_coverage(const umb_culler *culler)
 void *umb_culler_method_state(const umb_culler *culler)
 {
     return culler->method;
+}
+
+const uint32_t *umb_culler_candidates(const umb_culler *culler, uint32_t *object_count)
+{
+    *object_count = culler->filter.candidate_count;
+    return culler->filter.restricted ? culler->filter.candidates : NULL;
 }
 
 umb_culler_def umb_culler_settings(const umb_culler *culler)

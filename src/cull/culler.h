@@ -12,6 +12,8 @@ umb_culler_def umb_culler_settings(const umb_culler *culler);
 const umb_view *umb_culler_last_view(const umb_culler *culler, const uint32_t **ids, uint32_t *count);
 /* The method's buffer as the last umb_cull left it, or NULL. */
 const umb_coverage *umb_culler_coverage(const umb_culler *culler);
+/* The candidates, as umb_culler_set_candidates() was given them, or NULL. */
+const uint32_t *umb_culler_candidates(const umb_culler *culler, uint32_t *object_count);
 /* The method's own state, for measurements; NULL: it has none. */
 void *umb_culler_method_state(const umb_culler *culler);
 

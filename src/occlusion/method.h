@@ -27,6 +27,7 @@
 #include "coverage.h"
 #include "frustum/box_kernels.h"
 #include "raster_map.h"
+#include "scene/mask.h"
 #include "scene/scene.h"
 #include "umbrage/cull.h"
 
@@ -56,6 +57,7 @@ typedef struct umb_choice {
     uint32_t budget;    /* how many occluders to choose; 0: the method's default */
     uint32_t coherence; /* UMB_COHERENCE_... */
     umb_cull_stats *stats;
+    umb_mask mask;      /* occluders of other layers are not there (scene.h, occluder_masks); 0: all are */
 } umb_choice;
 
 /* What an answer says about what is below: nothing of it is or will be hidden, it need not be asked about. */

@@ -398,7 +398,11 @@ static void open_node(umb_selector *s, uint32_t number, uint16_t planes)
             continue;
         }
         if ((ref & UMB_REF_KIND) != UMB_REF_NODE) {
-            ref = UMB_REF_OCCLUDER | occluder_of(c->scene, ref);
+            uint32_t occluder = occluder_of(c->scene, ref);
+            if (!umb_mask_takes(c->mask, c->scene->occluder_masks[occluder])) {
+                continue;
+            }
+            ref = UMB_REF_OCCLUDER | occluder;
         }
         push(s, (umb_candidate){bound_of(s, node, slot, area), ref, UMB_NONE, left[slot], 0});
     }

@@ -24,12 +24,21 @@ static uint32_t *home_of(umb_scene *scene, const umb_occluder *occluder, const u
     return source->group != NULL ? &source->group->numbers[source->index] : &scene->occluders[source->index].number;
 }
 
+static uint32_t mask_of(const umb_scene *scene, const umb_occluder *occluder, const umb_occluder_source *source)
+{
+    if (occluder->owner != UMB_NONE) {
+        return scene->objects[occluder->owner].mask;
+    }
+    return source->group != NULL ? source->group->mask : scene->occluders[source->index].mask;
+}
+
 static void put(umb_scene *scene, uint32_t number, const umb_occluder *occluder, umb_weld_group *group, uint32_t index)
 {
     umb_occluder_source *source = &scene->sources[number];
     scene->committed_occluders[number] = *occluder;
     source->group = group;
     source->index = index;
+    scene->committed_masks[number] = mask_of(scene, occluder, source);
     *home_of(scene, occluder, source) = number;
     list(scene, number);
 }

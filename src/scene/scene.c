@@ -98,6 +98,7 @@ void umb_scene_destroy(umb_scene *scene)
                     scene->committed_object_capacity * sizeof *scene->committed_objects);
     umb_memory_free(&a, scene->committed_occluders,
                     scene->committed_occluder_capacity * sizeof *scene->committed_occluders);
+    umb_memory_free(&a, scene->committed_masks, scene->committed_mask_capacity * sizeof *scene->committed_masks);
     umb_memory_free(&a, scene->committed_moved,
                     scene->committed_moved_capacity * sizeof *scene->committed_moved);
     umb_memory_free(&a, scene->committed_came, scene->committed_came_capacity * sizeof *scene->committed_came);
@@ -176,7 +177,12 @@ umb_result umb_scene_add_object(umb_scene *scene, const umb_object_def *def, uin
         return umb_scene_fail(scene, UMB_ERROR_ARGUMENT, "an object's definition breaks the rules");
     }
     *out = UMB_NONE;
-    umb_object_slot slot = {.flags = def->flags, .weld = UMB_NONE, .mover = UMB_NONE, .state = UMB_SLOT_USED};
+    umb_object_slot slot = {.flags = def->flags,
+                            .mask = def->mask,
+                            .tag = def->tag,
+                            .weld = UMB_NONE,
+                            .mover = UMB_NONE,
+                            .state = UMB_SLOT_USED};
     umb_outcome seen;
     const umb_aabb *bounds = NULL;
     umb_result result = look(scene, def->shape, &def->transform, &seen);
@@ -296,6 +302,36 @@ umb_result umb_scene_flag_object(umb_scene *scene, uint32_t object, uint32_t fla
     return UMB_OK;
 }
 
+umb_result umb_scene_mask_object(umb_scene *scene, uint32_t object, uint32_t mask)
+{
+    umb_object_slot *slot = find_object(scene, object);
+    if (slot == NULL) {
+        return fail_object(scene, object);
+    }
+    if (slot->mask != mask) {
+        umb_weld_dissolve(scene, slot->weld);
+        slot->mask = mask;
+        umb_scene_touch_object(scene, object);
+    }
+    return UMB_OK;
+}
+
+umb_result umb_scene_tag_object(umb_scene *scene, uint32_t object, uint32_t tag)
+{
+    umb_object_slot *slot = find_object(scene, object);
+    if (slot == NULL) {
+        return fail_object(scene, object);
+    }
+    slot->tag = tag;
+    return UMB_OK;
+}
+
+uint32_t umb_scene_object_tag(const umb_scene *scene, uint32_t object)
+{
+    bool used = object < scene->object_ids.used && scene->objects[object].state == UMB_SLOT_USED;
+    return used ? scene->objects[object].tag : 0;
+}
+
 umb_result umb_scene_remove_object(umb_scene *scene, uint32_t object)
 {
     umb_object_slot *slot = find_object(scene, object);
@@ -372,6 +408,18 @@ umb_result umb_scene_open_occluder(umb_scene *scene, uint32_t occluder, bool ope
     return UMB_OK;
 }
 
+umb_result umb_scene_mask_occluder(umb_scene *scene, uint32_t occluder, uint32_t mask)
+{
+    if (occluder >= scene->occluder_ids.used || scene->occluders[occluder].state != UMB_SLOT_USED) {
+        return umb_scene_fail(scene, UMB_ERROR_ARGUMENT, "no occluder has number %u", occluder);
+    }
+    if (scene->occluders[occluder].mask != mask) {
+        scene->occluders[occluder].mask = mask;
+        umb_scene_renew_occluder(scene, occluder);
+    }
+    return UMB_OK;
+}
+
 uint32_t umb_scene_object_count(const umb_scene *scene)
 {
     return scene->object_ids.used;
@@ -403,6 +451,7 @@ size_t umb_scene_memory(const umb_scene *scene)
     bytes += scene->source_capacity * sizeof *scene->sources;
     bytes += scene->committed_object_capacity * sizeof *scene->committed_objects;
     bytes += scene->committed_occluder_capacity * sizeof *scene->committed_occluders;
+    bytes += scene->committed_mask_capacity * sizeof *scene->committed_masks;
     for (uint32_t i = 0; i < scene->shape_count; ++i) {
         bytes += scene->shapes[i]->bytes;
     }

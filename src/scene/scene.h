@@ -34,11 +34,13 @@ typedef struct umb_object {
     bool boxed : 1;       /* body, and it is a box */
     bool box : 1;         /* boxed, and it stands along the axes: it is its bounds, to the bit */
     umb_transform transform;
+    uint32_t mask;        /* its layers (mask.h) */
 } umb_object;
 
 typedef struct umb_committed {
     const umb_object *objects;
     const umb_occluder *occluders; /* owned ones first, then stand-alone ones; numbers may change with structure */
+    const uint32_t *occluder_masks; /* the layers of each occluder (mask.h) */
     uint32_t object_count, occluder_count;
     uint32_t first_free_occluder;  /* occluders from here on have no owner */
     uint64_t version;              /* grows by one with every commit that changed something */

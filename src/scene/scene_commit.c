@@ -55,6 +55,7 @@ static umb_object make_object(const umb_scene *scene, const umb_object_slot *slo
         o.bounds = slot->bounds;
         o.mesh = umb_scene_mesh(scene, slot->placement.shape);
         o.transform = slot->placement.transform;
+        o.mask = slot->mask;
         o.used = true;
         o.mover = slot->mover;
         o.exact = umb_motion_is_exact(scene, slot);
@@ -90,6 +91,8 @@ static bool reserve(umb_scene *scene, size_t occluders)
                            sizeof *scene->committed_objects) &&
         umb_memory_reserve(a, (void **)&scene->committed_occluders, &scene->committed_occluder_capacity, occluders,
                            sizeof *scene->committed_occluders) &&
+        umb_memory_reserve(a, (void **)&scene->committed_masks, &scene->committed_mask_capacity, occluders,
+                           sizeof *scene->committed_masks) &&
         umb_memory_reserve(a, (void **)&scene->sources, &scene->source_capacity, occluders, sizeof *scene->sources) &&
         umb_memory_reserve(a, (void **)&scene->committed_replaced, &scene->committed_replaced_capacity, occluders,
                            sizeof *scene->committed_replaced) &&
@@ -111,6 +114,7 @@ static void show(umb_scene *scene)
     umb_committed *c = &scene->committed;
     c->objects = scene->committed_objects;
     c->occluders = scene->committed_occluders;
+    c->occluder_masks = scene->committed_masks;
     c->moved = scene->committed_moved;
     c->came = scene->committed_came;
     c->went = scene->committed_went;
@@ -198,6 +202,7 @@ static void commit_object(umb_scene *scene, uint32_t id)
             umb_occluders_add_owned(scene, &owned);
         } else {
             scene->committed_occluders[occluder] = owned;
+            scene->committed_masks[occluder] = slot->mask;
         }
     }
     bool live = scene->committed_objects[id].live;
@@ -280,6 +285,7 @@ static void commit_moved(umb_scene *scene)
         object->mover = slot->mover;
         object->exact = umb_motion_is_exact(scene, slot);
         object->box = is_box(object, p);
+        object->mask = slot->mask;
         if (object->occluder != UMB_NONE) {
             umb_occluder *occluder = &scene->committed_occluders[object->occluder];
             occluder->transform = p->transform;
@@ -287,6 +293,7 @@ static void commit_moved(umb_scene *scene)
             occluder->identity = p->identity;
             occluder->mirrored = p->mirrored;
             occluder->moves = moves(scene, slot);
+            scene->committed_masks[object->occluder] = slot->mask;
         }
         scene->committed_moved[count] = scene->touched[i];
         count += object->live ? 1u : 0u;

@@ -25,6 +25,7 @@ typedef struct umb_object_slot {
     umb_placement placement;
     umb_aabb bounds;
     uint32_t flags;
+    uint32_t mask, tag;
     uint32_t weld; /* group it is welded into, or UMB_NONE */
     uint32_t mover; /* its number in movers, or UMB_NONE */
     uint8_t state;
@@ -34,6 +35,7 @@ typedef struct umb_object_slot {
 typedef struct umb_occluder_slot {
     umb_placement placement;
     uint32_t number; /* of the committed occluder; UMB_NONE: there is none */
+    uint32_t mask;
     uint8_t state;
     bool open;    /* it hides nothing for now */
     bool touched; /* is in the list of touched occluders */
@@ -45,6 +47,7 @@ typedef struct umb_weld_group {
     umb_mesh **meshes; /* in world coordinates */
     uint32_t *numbers; /* of the committed occluders, if committed */
     uint32_t member_count, mesh_count;
+    uint32_t mask; /* of all members */
     bool committed;
     size_t bytes;                /* of this block */
     struct umb_weld_group *next; /* among the retired */
@@ -134,9 +137,11 @@ struct umb_scene {
     umb_committed committed;
     umb_object *committed_objects;
     umb_occluder *committed_occluders;
+    uint32_t *committed_masks; /* of the occluders */
     umb_occluder_source *sources; /* of the committed occluders */
     uint32_t *committed_moved, *committed_came, *committed_went, *committed_replaced;
     size_t committed_object_capacity, committed_occluder_capacity, source_capacity;
+    size_t committed_mask_capacity;
     size_t committed_moved_capacity, committed_came_capacity, committed_went_capacity, committed_replaced_capacity;
     umb_scene_listener *listeners;
     umb_movers_state moving;

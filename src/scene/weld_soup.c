@@ -88,12 +88,6 @@ static void add_triangles(umb_weld_soup *soup, const umb_scene *scene, uint32_t 
     }
 }
 
-static bool is_member(const umb_scene *scene, uint32_t object)
-{
-    const umb_object_slot *slot = &scene->objects[object];
-    return (slot->flags & UMB_OBJECT_STATIC) != 0 && slot->mover == UMB_NONE && umb_scene_object_hides(scene, slot);
-}
-
 static umb_result collect(umb_weld_soup *soup, umb_scene *scene, umb_scratch *scratch)
 {
     uint32_t *members = umb_scratch_get(scratch, soup->object_count, sizeof *members);
@@ -104,7 +98,7 @@ static umb_result collect(umb_weld_soup *soup, umb_scene *scene, umb_scratch *sc
     uint64_t position_count = 0, triangle_count = 0;
     uint32_t count = 0;
     for (uint32_t i = 0; i < soup->object_count; ++i) {
-        if (is_member(scene, i)) {
+        if (scene->objects[i].mask == soup->mask && umb_weld_is_member(scene, &scene->objects[i])) {
             const umb_mesh *mesh = umb_scene_mesh(scene, scene->objects[i].placement.shape);
             members[count] = i;
             offsets[count++] = (uint32_t)position_count;

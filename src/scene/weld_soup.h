@@ -25,6 +25,7 @@ typedef struct umb_weld_soup {
     uint32_t *parents; /* union-find over objects: which touch */
     uint32_t *merged;  /* per object that stands for those it touches: triangles saved by merging */
     uint32_t object_count;
+    uint32_t mask; /* only objects of this one */
     umb_weld_stats stats;
 } umb_weld_soup;
 
@@ -35,7 +36,13 @@ typedef struct umb_weld_edges {
     uint32_t count;
 } umb_weld_edges;
 
-/* Collect the triangles of all static objects of the scene that hide. */
+/* True for static objects that hide. */
+static inline bool umb_weld_is_member(const umb_scene *scene, const umb_object_slot *slot)
+{
+    return (slot->flags & UMB_OBJECT_STATIC) != 0 && slot->mover == UMB_NONE && umb_scene_object_hides(scene, slot);
+}
+
+/* Collect the triangles of all static objects of the scene that hide, if they are of the soup's mask. */
 umb_result umb_weld_soup_collect(umb_weld_soup *soup, umb_scene *scene);
 void umb_weld_soup_free(umb_weld_soup *soup);
 
