@@ -66,10 +66,12 @@ static bool is_welded(const umb_occluder *o)
     return o->owner == UMB_NONE && o->identity && !o->moves && !o->mesh->convex;
 }
 
-/* The surfaces that stand in world coordinates, as one: equal positions are one vertex, equal triangles one. */
+/* The surfaces that stand in world coordinates, as one: equal positions are one vertex, equal triangles one. Surfaces of
+ * different masks have nothing in common, for a view may have one of them alone. */
 typedef struct soup_maker {
     umb_selector *s;
     uint32_t *by_position, *by_triangle; /* open tables of numbers */
+    uint32_t *masks;                     /* of each vertex */
     uint32_t position_slots, triangle_slots;
 } soup_maker;
 
@@ -82,27 +84,30 @@ static uint32_t slots_for(size_t count)
     return slots;
 }
 
-static uint32_t soup_vertex(soup_maker *m, const float p[3])
+static uint32_t soup_vertex(soup_maker *m, const float p[3], uint32_t mask)
 {
     const float folded[3] = {p[0] + 0.0f, p[1] + 0.0f, p[2] + 0.0f};
     uint32_t at = umb_position_hash(folded) & (m->position_slots - 1);
     for (; m->by_position[at] != UMB_NONE; at = (at + 1) & (m->position_slots - 1)) {
-        if (memcmp(m->s->soup.positions[m->by_position[at]], folded, sizeof folded) == 0) {
-            return m->by_position[at];
+        uint32_t known = m->by_position[at];
+        if (m->masks[known] == mask && memcmp(m->s->soup.positions[known], folded, sizeof folded) == 0) {
+            return known;
         }
     }
     uint32_t number = m->s->soup_positions++;
+    m->masks[number] = mask;
     memcpy(m->s->soup.positions[number], folded, sizeof folded);
     m->by_position[at] = number;
     return number;
 }
 
-static void soup_triangle(soup_maker *m, const umb_occluder *o, uint32_t t, uint32_t tag)
+static void soup_triangle(soup_maker *m, const umb_committed *scene, uint32_t t, uint32_t tag)
 {
     umb_selector *s = m->s;
+    const umb_occluder *o = &scene->occluders[tag];
     uint32_t v[3], turned[3], low = 0;
     for (int k = 0; k < 3; ++k) {
-        v[k] = soup_vertex(m, o->mesh->positions[o->mesh->triangles[t][k]]);
+        v[k] = soup_vertex(m, o->mesh->positions[o->mesh->triangles[t][k]], scene->occluder_masks[tag]);
         low = v[k] < v[low] ? (uint32_t)k : low;
     }
     for (uint32_t k = 0; k < 3; ++k) {
@@ -146,6 +151,7 @@ static bool make_soup(umb_selector *s, const umb_committed *scene)
     soup_maker m = {.s = s, .position_slots = slots_for(positions), .triangle_slots = slots_for(triangles)};
     m.by_position = umb_scratch_get(&scratch, m.position_slots, sizeof *m.by_position);
     m.by_triangle = umb_scratch_get(&scratch, m.triangle_slots, sizeof *m.by_triangle);
+    m.masks = umb_scratch_get(&scratch, positions, sizeof *m.masks);
     s->soup.triangle_count = s->soup_positions = 0;
     bool ok = !scratch.failed && reserve_soup(s, positions, triangles);
     if (ok) {
@@ -154,7 +160,7 @@ static bool make_soup(umb_selector *s, const umb_committed *scene)
         for (uint32_t i = 0; i < scene->occluder_count; ++i) {
             const umb_occluder *o = &scene->occluders[i];
             for (uint32_t t = 0; is_welded(o) && t < o->mesh->triangle_count; ++t) {
-                soup_triangle(&m, o, t, i);
+                soup_triangle(&m, scene, t, i);
             }
         }
         s->soup.tags = s->soup_tags;
