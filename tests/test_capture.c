@@ -12,6 +12,7 @@
 #include "base/checksum.h"
 #include "cull/capture_format.h"
 #include "support/failing.h"
+#include "support/moving_town.h"
 #include "umbrage/umbrage.h"
 
 typedef struct frame {
@@ -222,6 +223,130 @@ static void test_round_trip(void **state)
     assert_true(answered > 500 && hidden > 40);
 }
 
+/* ---- things that move by themselves -------------------------------------------------------------- */
+
+static const umb_method METHODS[5] = {UMB_METHOD_RASTER, UMB_METHOD_NONE, UMB_METHOD_PLANES, UMB_METHOD_SHADOW_FRUSTA,
+                                      UMB_METHOD_OCCLUSION_TREE};
+
+/* Some answers of it are not known. */
+static bool pose_or_nothing(void *user, uint32_t object, double time, umb_pose *out)
+{
+    return object % 29 != 4 && moving_town_pose(user, object, time, out);
+}
+
+typedef struct motion_frame {
+    moving_town town;
+    umb_scene *scene;
+    umb_index *index;
+    umb_culler *cullers[5];
+} motion_frame;
+
+static void motion_make(motion_frame *m, const char *spec, const char *kind)
+{
+    umb_index_def def = {0};
+    moving_town_make(&m->town, spec);
+    for (uint32_t i = 0; i < m->town.model->object_count; ++i) {
+        m->town.motions[i].fuzzy = i % 17 == 3;
+    }
+    m->scene = moving_town_scene(&m->town, NULL, true);
+    umb_pose_source source = {pose_or_nothing, &m->town};
+    assert_int_equal(umb_scene_set_poses(m->scene, &source), UMB_OK);
+    assert_true(umb_index_parse(kind, &def));
+    assert_int_equal(umb_index_create(m->scene, &def, &m->index), UMB_OK);
+    for (int k = 0; k < 5; ++k) {
+        umb_culler_def culler_def = {.method = METHODS[k]};
+        assert_int_equal(umb_culler_create(m->index, &culler_def, &m->cullers[k]), UMB_OK);
+    }
+}
+
+static void motion_free(motion_frame *m)
+{
+    for (int k = 0; k < 5; ++k) {
+        umb_culler_destroy(m->cullers[k]);
+    }
+    umb_index_destroy(m->index);
+    umb_scene_destroy(m->scene);
+    moving_town_free(&m->town);
+}
+
+/* Objects stop, go, begin to move again: movers' numbers have holes. */
+static void motion_edit(motion_frame *m, uint32_t round)
+{
+    uint32_t object = 7 * round % m->town.model->object_count;
+    if (m->town.moves[object] && round % 3 == 1) {
+        assert_int_equal(umb_scene_set_motion(m->scene, object, round % 2 ? NULL : &m->town.motions[object]), UMB_OK);
+    }
+    assert_int_equal(umb_scene_set_time(m->scene, 0.1 * round), UMB_OK);
+    assert_int_equal(umb_scene_commit(m->scene), UMB_OK);
+}
+
+static void check_again(const umb_culler *culler, const umb_visible_set *seen)
+{
+    umb_tasks none = {0};
+    umb_capture c;
+    umb_visible_set again;
+    umb_error error = {0};
+    size_t size, size_again;
+    uint8_t *bytes = save(culler, &size);
+    assert_int_equal(umb_capture_load(bytes, size, UMB_ISA_AUTO, none, &c, &error), UMB_OK);
+    assert_int_equal(c.answer_count, seen->count);
+    assert_int_equal(umb_cull(c.culler, &c.view, &again), UMB_OK);
+    assert_int_equal(again.count, seen->count);
+    assert_memory_equal(again.objects, seen->objects, seen->count * sizeof *c.answer);
+    assert_memory_equal(again.inside, seen->inside, seen->count);
+    assert_int_equal(again.class_, seen->class_);
+    assert_int_equal(again.stats.occluders, seen->stats.occluders);
+    assert_int_equal(again.stats.hidden_movers, seen->stats.hidden_movers);
+    uint8_t *bytes_again = save(c.culler, &size_again);
+    if (c.index_def.kind != UMB_INDEX_KDTREE) { /* when all parts are wholes again, the loaded one needs no boxes */
+        assert_int_equal(size_again, size);
+        assert_memory_equal(bytes_again, bytes, size);
+    }
+    free(bytes);
+    free(bytes_again);
+    umb_view later = c.view; /* nothing is known of another time: all that moves is reported, or out of sight */
+    later.time += 100.0;
+    assert_int_equal(umb_cull(c.culler, &later, &again), UMB_OK);
+    assert_int_equal(umb_scene_set_time(c.scene, later.time), UMB_OK);
+    assert_int_equal(umb_scene_commit(c.scene), UMB_OK);
+    assert_int_equal(umb_cull(c.culler, &later, &again), UMB_OK);
+    umb_capture_free(&c);
+}
+
+/* Frames in the middle of a motion are answered again: at the scene's time, before it and after, when volumes have
+ * expired. */
+static void test_motion(void **state)
+{
+    (void)state;
+    static const char *const kinds[4] = {"bvh", "flat", "kdtree,median", "kdtree,median"};
+    const char *size = getenv("UMBRAGE_TEST_SIZE");
+    uint32_t poses = 0, expired = 0;
+    for (int i = 0; i < 4; ++i) {
+        motion_frame m;
+        motion_make(&m, i < 3 ? "gen:blocks,g=5" : "gen:blocks,g=1", kinds[i]);
+        for (uint32_t round = 0; round < (size != NULL && size[0] == 's' ? 15u : 60u); ++round) {
+            motion_edit(&m, round);
+            double shift = round % 3 == 0 ? 0.0 : round % 3 == 1 ? 1.5 : -0.3;
+            umb_view view = moving_town_view(&m.town, round, 0.1 * round + shift);
+            view.min_pixels = round % 5 == 4 ? 2.0 : 0.0;
+            for (int k = 0; k < 5; ++k) {
+                umb_visible_set seen;
+                assert_int_equal(umb_cull(m.cullers[k], &view, &seen), UMB_OK);
+                poses += seen.stats.poses;
+                expired += seen.stats.expired;
+                if (round % 5 == (uint32_t)k || round % 7 == 3) {
+                    check_again(m.cullers[k], &seen);
+                }
+            }
+        }
+        size_t bytes; /* a commit takes what was told */
+        assert_int_equal(umb_scene_commit(m.scene), UMB_OK);
+        assert_int_equal(umb_capture_save(m.cullers[0], NULL, 0, &bytes), UMB_ERROR_STATE);
+        motion_free(&m);
+    }
+    assert_true(poses > 1000 && expired > 100);
+}
+
 static void test_nothing_to_save(void **state)
 {
     (void)state;
@@ -270,20 +395,16 @@ static void set_checksum(uint8_t *bytes, size_t size)
 }
 
 /* Every bit of damage is noticed, and damage that is signed with a right checksum does no harm. */
-static void test_damage(void **state)
+static void check_damage(const umb_culler *culler, size_t step)
 {
-    (void)state;
     dice d = {43};
     umb_tasks none = {0};
-    frame f = make_frame(&d, 12, UMB_METHOD_RASTER, UMB_INDEX_BVH, NULL);
-    umb_view view = random_view(&d);
     umb_visible_set seen;
-    assert_int_equal(umb_cull(f.culler, &view, &seen), UMB_OK);
     size_t size;
-    uint8_t *bytes = save(f.culler, &size);
+    uint8_t *bytes = save(culler, &size);
     umb_capture c;
     umb_error error = {0};
-    for (size_t i = 0; i < size; ++i) {
+    for (size_t i = 0; i < size; i += step) {
         uint8_t right = bytes[i];
         bytes[i] ^= (uint8_t)(1u << dice_roll(&d, 8));
         umb_result result = umb_capture_load(bytes, size, UMB_ISA_AUTO, none, &c, &error);
@@ -292,7 +413,7 @@ static void test_damage(void **state)
         assert_true(strlen(error.text) > 0);
         bytes[i] = right;
     }
-    for (size_t cut = 0; cut < size; ++cut) {
+    for (size_t cut = 0; cut < size; cut += step) {
         uint8_t *part = malloc(cut + 1);
         assert_non_null(part);
         memcpy(part, bytes, cut);
@@ -303,7 +424,7 @@ static void test_damage(void **state)
     assert_int_equal(umb_capture_load(NULL, 0, UMB_ISA_AUTO, none, &c, &error), UMB_ERROR_FORMAT);
     uint8_t *copy = malloc(size);
     assert_non_null(copy);
-    for (size_t i = UMB_CAPTURE_TABLE; i < size; ++i) {
+    for (size_t i = UMB_CAPTURE_TABLE; i < size; i += step) {
         memcpy(copy, bytes, size);
         copy[i] = (uint8_t)(dice_roll(&d, 2) != 0 ? copy[i] + 1u : dice_roll(&d, 256));
         set_checksum(copy, size);
@@ -316,7 +437,27 @@ static void test_damage(void **state)
     }
     free(copy);
     free(bytes);
+}
+
+static void test_damage(void **state)
+{
+    (void)state;
+    dice d = {43};
+    frame f = make_frame(&d, 12, UMB_METHOD_RASTER, UMB_INDEX_BVH, NULL);
+    umb_view view = random_view(&d);
+    umb_visible_set seen;
+    assert_int_equal(umb_cull(f.culler, &view, &seen), UMB_OK);
+    check_damage(f.culler, 1);
     free_frame(&f);
+    motion_frame m;
+    motion_make(&m, "gen:blocks,g=5", "bvh");
+    for (uint32_t round = 0; round < 5; ++round) {
+        motion_edit(&m, round);
+        view = moving_town_view(&m.town, round, 0.1 * round);
+        assert_int_equal(umb_cull(m.cullers[0], &view, &seen), UMB_OK);
+    }
+    check_damage(m.cullers[0], 61);
+    motion_free(&m);
 }
 
 static void test_isa(void **state)
@@ -380,6 +521,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_checksum),
         cmocka_unit_test(test_round_trip),
+        cmocka_unit_test(test_motion),
         cmocka_unit_test(test_nothing_to_save),
         cmocka_unit_test(test_damage),
         cmocka_unit_test(test_isa),

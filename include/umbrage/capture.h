@@ -12,8 +12,10 @@ extern "C" {
 
 /* Write the frame that the culler answered last into bytes, if capacity allows; *size is always set
  * to the bytes needed. Pass bytes NULL, capacity 0 to ask. UMB_ERROR_STATE before the first
- * umb_cull, when the scene has changed since, and when it has objects that move by themselves (motion.h); UMB_ERROR_ARGUMENT when bytes is not NULL and
- * capacity is too small (nothing is written). */
+ * umb_cull, and when the scene was committed since, if that changed anything or something in it moves by itself (motion.h),
+ * or other candidates were set; UMB_ERROR_ARGUMENT when bytes is not NULL and capacity is too small (nothing is
+ * written). Of objects that move by themselves their volumes are written, and the poses that were asked for; the loaded scene
+ * knows no others: what it is asked beyond the captured view is reported as visible. */
 UMB_API umb_result umb_capture_save(const umb_culler *culler, void *bytes, size_t capacity, size_t *size);
 
 /* A loaded capture: its scene, index and culler are its own, ready for umb_cull with its view. */
@@ -26,7 +28,8 @@ typedef struct umb_capture {
     umb_index_def index_def;
     uint32_t *answer; /* ids as they were answered, in order */
     uint32_t answer_count;
-    void *block; /* owns answer */
+    void *block; /* owns answer, and the poses of what moved */
+    size_t block_size;
 } umb_capture;
 
 /* Read a block. Every offset and count is checked before use; anything wrong is UMB_ERROR_FORMAT or

@@ -10,7 +10,7 @@
 
 /* Sections in the order of the file and the bytes of a record of each. */
 #define UMB_CAPTURE_SECTIONS(X) \
-    X(FRAME, 568)               \
+    X(FRAME, 576)               \
     X(MESHES, 8)                \
     X(POSITIONS, 12)            \
     X(TRIANGLES, 12)            \
@@ -20,6 +20,10 @@
     X(NODES, 32)                \
     X(BOXES, 192)               \
     X(CANDIDATES, 4)            \
+    X(MOVERS, 8)                \
+    X(EXPIRIES, 12)             \
+    X(EXACT, 4)                 \
+    X(POSES, 76)                \
     X(ANSWER, 4)
 
 enum {
@@ -46,6 +50,13 @@ enum {
     UMB_CAPTURE_MASK_ALL = 1u << 0,
     UMB_CAPTURE_MASKED_HIDE = 1u << 1,
     UMB_CAPTURE_VIEW_MARKS = (1u << 2) - 1
+};
+
+/* Marks of a mover. */
+enum {
+    UMB_CAPTURE_EXACT_MOVER = 1u << 0,
+    UMB_CAPTURE_FUZZY = 1u << 1,
+    UMB_CAPTURE_MOVER_MARKS = (1u << 2) - 1
 };
 
 static inline uint32_t umb_capture_record_bytes(int section)

@@ -8,7 +8,21 @@
 #include "culler.h"
 #include "index/index_name.h"
 #include "index/tree.h"
+#include "scene/motion_restore.h"
 #include "umbrage/capture.h"
+
+/* A pose that was told for the frame. */
+typedef struct stored_pose {
+    uint32_t object;
+    umb_transform transform;
+    umb_aabb bounds;
+} stored_pose;
+
+/* What the callback of the loaded scene looks at; it begins the capture's block. */
+typedef struct pose_table {
+    stored_pose *poses; /* by object */
+    uint32_t count;
+} pose_table;
 
 typedef struct loader {
     const uint8_t *bytes;
@@ -16,7 +30,8 @@ typedef struct loader {
     const uint8_t *sections[UMB_CAPTURE_SECTION_COUNT];
     uint32_t counts[UMB_CAPTURE_SECTION_COUNT];
     const uint8_t *at;
-    double origin[3];
+    double origin[3], time; /* of the scene */
+    pose_table *poses;
     umb_shape *shapes;
     umb_tasks tasks;
     umb_isa isa;
@@ -131,6 +146,7 @@ static umb_result read_frame(loader *l)
     get_doubles(l, v->vertical, 3);
     get_doubles(l, numbers, 8);
     get_doubles(l, v->planes[0], 4 * UMB_MAX_CLIP_PLANES);
+    get_doubles(l, &l->time, 1);
     for (int i = 0; i < 10; ++i) {
         words[i] = get_word(l);
     }
@@ -219,16 +235,20 @@ static bool get_shape(loader *l, umb_shape *out)
     return m == UMB_NONE || *out != 0;
 }
 
+static umb_aabb get_box(loader *l)
+{
+    umb_aabb box;
+    for (int k = 0; k < 6; ++k) {
+        *(k < 3 ? &box.min[k] : &box.max[k - 3]) = get_float(l);
+    }
+    return box;
+}
+
 /* An id that is free in the capture is one that was used and removed. */
 static umb_result read_object(loader *l)
 {
     umb_object_def def = {0};
-    for (int k = 0; k < 3; ++k) {
-        def.bounds.min[k] = get_float(l);
-    }
-    for (int k = 0; k < 3; ++k) {
-        def.bounds.max[k] = get_float(l);
-    }
+    def.bounds = get_box(l);
     def.transform = get_transform(l);
     bool known = get_shape(l, &def.shape);
     uint32_t marks = get_word(l), id = UMB_NONE;
@@ -248,7 +268,111 @@ static umb_result read_object(loader *l)
     return result;
 }
 
-static umb_result read_scene(loader *l)
+/* Only what was asked for in the frame is known. */
+static bool tell_pose(void *user, uint32_t object, double time, umb_pose *out)
+{
+    const pose_table *t = user;
+    uint32_t low = 0, high = t->count;
+    (void)time;
+    while (low < high) {
+        uint32_t middle = low + (high - low) / 2;
+        if (t->poses[middle].object < object) {
+            low = middle + 1;
+        } else {
+            high = middle;
+        }
+    }
+    if (low == t->count || t->poses[low].object != object) {
+        return false;
+    }
+    out->transform = t->poses[low].transform;
+    out->bounds = t->poses[low].bounds;
+    return true;
+}
+
+static umb_result read_poses(loader *l)
+{
+    l->at = l->sections[UMB_CAPTURE_POSES];
+    for (uint32_t i = 0; i < l->poses->count; ++i) {
+        stored_pose *p = &l->poses->poses[i];
+        p->object = get_word(l);
+        p->transform = get_transform(l);
+        p->bounds = get_box(l);
+        if (i > 0 && p->object <= p[-1].object) {
+            return fail(l, "poses in no order");
+        }
+    }
+    return UMB_OK;
+}
+
+/* Poses and answer, which last as long as the capture. */
+static umb_result read_block(loader *l)
+{
+    umb_allocator allocator = umb_memory_allocator(NULL);
+    uint32_t count = l->counts[UMB_CAPTURE_ANSWER], poses = l->counts[UMB_CAPTURE_POSES];
+    size_t size = sizeof(pose_table) + poses * sizeof(stored_pose) + count * sizeof(uint32_t);
+    uint8_t *block = umb_memory_allocate(&allocator, size);
+    if (block == NULL) {
+        return fail_call(l, UMB_ERROR_MEMORY, "answer");
+    }
+    l->out->block = block;
+    l->out->block_size = size;
+    l->poses = (pose_table *)(void *)block;
+    l->poses->poses = (stored_pose *)(void *)(block + sizeof *l->poses);
+    l->poses->count = poses;
+    l->out->answer = (uint32_t *)(void *)(l->poses->poses + poses);
+    l->out->answer_count = count;
+    l->at = l->sections[UMB_CAPTURE_ANSWER];
+    for (uint32_t i = 0; i < count; ++i) {
+        l->out->answer[i] = get_word(l);
+        if (l->out->answer[i] >= l->counts[UMB_CAPTURE_OBJECTS]) {
+            return fail(l, "an answer that names no object");
+        }
+    }
+    return read_poses(l);
+}
+
+/* Movers, when the objects are there; and the scene's first commit. */
+static umb_result read_motion(loader *l, umb_scratch *scratch)
+{
+    uint32_t movers = l->counts[UMB_CAPTURE_MOVERS], expiries = l->counts[UMB_CAPTURE_EXPIRIES];
+    uint32_t exact = l->counts[UMB_CAPTURE_EXACT], marks = 0;
+    umb_stored_mover *stored = umb_scratch_get(scratch, movers, sizeof *stored);
+    umb_expiry *queue = umb_scratch_get(scratch, expiries, sizeof *queue);
+    uint32_t *list = umb_scratch_get(scratch, exact, sizeof *list);
+    if (scratch->failed) {
+        return UMB_ERROR_MEMORY;
+    }
+    l->at = l->sections[UMB_CAPTURE_MOVERS];
+    for (uint32_t i = 0; i < movers; ++i) {
+        uint32_t object = get_word(l), mark = get_word(l);
+        stored[i] = (umb_stored_mover){object, (mark & UMB_CAPTURE_EXACT_MOVER) != 0, (mark & UMB_CAPTURE_FUZZY) != 0};
+        marks |= mark;
+    }
+    l->at = l->sections[UMB_CAPTURE_EXPIRIES];
+    for (uint32_t i = 0; i < expiries; ++i) {
+        get_doubles(l, &queue[i].until, 1);
+        queue[i].mover = get_word(l);
+    }
+    l->at = l->sections[UMB_CAPTURE_EXACT];
+    for (uint32_t i = 0; i < exact; ++i) {
+        list[i] = get_word(l);
+    }
+    if ((marks & ~(uint32_t)UMB_CAPTURE_MOVER_MARKS) != 0) {
+        return UMB_ERROR_FORMAT;
+    }
+    umb_stored_motion motion = {.movers = stored,
+                                .expiries = queue,
+                                .exact = list,
+                                .mover_count = movers,
+                                .expiry_count = expiries,
+                                .exact_count = exact,
+                                .time = l->time,
+                                .source = {tell_pose, l->poses}};
+    return umb_motion_restore(l->out->scene, &motion);
+}
+
+static umb_result read_scene(loader *l, umb_scratch *scratch)
 {
     umb_result result = UMB_OK;
     l->at = l->sections[UMB_CAPTURE_OBJECTS];
@@ -271,7 +395,7 @@ static umb_result read_scene(loader *l)
             return fail_call(l, result, "occluders");
         }
     }
-    result = umb_scene_commit(l->out->scene);
+    result = read_motion(l, scratch);
     return result == UMB_OK ? UMB_OK : fail_call(l, result, "objects");
 }
 
@@ -304,27 +428,6 @@ static umb_result read_index(loader *l, umb_scratch *scratch)
     return result == UMB_OK ? UMB_OK : fail_call(l, result, "index's nodes");
 }
 
-static umb_result read_answer(loader *l)
-{
-    umb_allocator allocator = umb_memory_allocator(NULL);
-    uint32_t count = l->counts[UMB_CAPTURE_ANSWER];
-    uint32_t *answer = umb_memory_allocate(&allocator, count * sizeof *answer);
-    if (answer == NULL) {
-        return fail_call(l, UMB_ERROR_MEMORY, "answer");
-    }
-    l->out->block = answer;
-    l->out->answer = answer;
-    l->out->answer_count = count;
-    l->at = l->sections[UMB_CAPTURE_ANSWER];
-    for (uint32_t i = 0; i < count; ++i) {
-        answer[i] = get_word(l);
-        if (answer[i] >= l->counts[UMB_CAPTURE_OBJECTS]) {
-            return fail(l, "an answer that names no object");
-        }
-    }
-    return UMB_OK;
-}
-
 static umb_result read_candidates(loader *l, umb_scratch *scratch)
 {
     uint32_t count = l->counts[UMB_CAPTURE_CANDIDATES];
@@ -354,9 +457,9 @@ static umb_result load(loader *l, umb_scratch *scratch)
         return fail_call(l, result, "origin");
     }
     result = read_meshes(l, scratch);
-    result = result == UMB_OK ? read_scene(l) : result;
+    result = result == UMB_OK ? read_block(l) : result;
+    result = result == UMB_OK ? read_scene(l, scratch) : result;
     result = result == UMB_OK ? read_index(l, scratch) : result;
-    result = result == UMB_OK ? read_answer(l) : result;
     if (result != UMB_OK) {
         return result;
     }
@@ -394,7 +497,7 @@ void umb_capture_free(umb_capture *capture)
         umb_culler_destroy(capture->culler);
         umb_index_destroy(capture->index);
         umb_scene_destroy(capture->scene);
-        umb_memory_free(&allocator, capture->block, capture->answer_count * sizeof *capture->answer);
+        umb_memory_free(&allocator, capture->block, capture->block_size);
         memset(capture, 0, sizeof *capture);
     }
 }

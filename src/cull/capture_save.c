@@ -1,4 +1,6 @@
 /* Writing a captured frame: umb_capture_save(). */
+#include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "base/checksum.h"
@@ -20,6 +22,10 @@ typedef struct saver {
     uint32_t answer_count;
     const uint32_t *candidates; /* bits, or NULL */
     uint32_t candidate_count;
+    uint32_t *movers;           /* numbers of those that are in use, ascending */
+    uint32_t *mover_numbers;    /* of each number, its place in that list */
+    const umb_posed **poses;    /* that are known, by object */
+    uint32_t mover_count, pose_count;
     const umb_mesh **meshes; /* all that objects and occluders name, by first use */
     uint32_t mesh_count;
     uint32_t *table; /* hash table of mesh numbers */
@@ -102,6 +108,38 @@ static bool gather_meshes(saver *s, umb_scratch *scratch)
     return true;
 }
 
+static int by_object(const void *a, const void *b)
+{
+    uint32_t x = (*(const umb_posed *const *)a)->object, y = (*(const umb_posed *const *)b)->object;
+    return (x > y) - (x < y);
+}
+
+static bool gather_movers(saver *s, umb_scratch *scratch)
+{
+    const umb_motion *m = &s->committed->motion;
+    uint32_t told;
+    const umb_posed *posed = umb_culler_posed(s->culler, &told);
+    s->movers = umb_scratch_get(scratch, m->number_count, sizeof *s->movers);
+    s->mover_numbers = umb_scratch_get(scratch, m->number_count, sizeof *s->mover_numbers);
+    s->poses = umb_scratch_get(scratch, told, sizeof *s->poses);
+    if (scratch->failed) {
+        return false;
+    }
+    for (uint32_t i = 0; i < m->number_count; ++i) {
+        s->mover_numbers[i] = s->mover_count;
+        if (m->objects[i] != UMB_NONE) {
+            s->movers[s->mover_count++] = i;
+        }
+    }
+    for (uint32_t i = 0; i < told && s->mover_count > 0; ++i) {
+        if (posed[i].known) {
+            s->poses[s->pose_count++] = &posed[i];
+        }
+    }
+    qsort(s->poses, s->pose_count, sizeof *s->poses, by_object);
+    return true;
+}
+
 static void lay_out(saver *s)
 {
     s->counts[UMB_CAPTURE_FRAME] = 1;
@@ -114,6 +152,10 @@ static void lay_out(saver *s)
     s->counts[UMB_CAPTURE_BOXES] = s->tree->several ? s->tree->node_count : 0;
     s->candidates = umb_culler_candidates(s->culler, &s->candidate_count);
     s->counts[UMB_CAPTURE_CANDIDATES] = s->candidates != NULL ? ((uint64_t)s->committed->object_count + 31) / 32 : 0;
+    s->counts[UMB_CAPTURE_MOVERS] = s->mover_count;
+    s->counts[UMB_CAPTURE_EXPIRIES] = s->committed->motion.expiry_count;
+    s->counts[UMB_CAPTURE_EXACT] = s->committed->motion.exact_count;
+    s->counts[UMB_CAPTURE_POSES] = s->pose_count;
     s->counts[UMB_CAPTURE_ANSWER] = s->answer_count;
     s->size = UMB_CAPTURE_HEADER;
     for (int k = 0; k < UMB_CAPTURE_SECTION_COUNT; ++k) {
@@ -139,6 +181,7 @@ static void put_frame(saver *s)
         static const double none[4] = {0, 0, 0, 0};
         put_doubles(s, i < v->plane_count ? v->planes[i] : none, 4);
     }
+    put_doubles(s, &s->committed->motion.time, 1);
     uint32_t marks = (v->mask_all ? UMB_CAPTURE_MASK_ALL : 0u) | (v->masked_hide ? UMB_CAPTURE_MASKED_HIDE : 0u);
     const uint32_t words[10] = {(uint32_t)umb_culler_settings(s->culler).method,
                                umb_index_name_pack(&index),
@@ -203,17 +246,19 @@ static void put_boxes(saver *s, const umb_node *node)
     }
 }
 
+static void put_box(saver *s, const umb_aabb *box)
+{
+    for (int k = 0; k < 6; ++k) {
+        put_float(s, k < 3 ? box->min[k] : box->max[k - 3]);
+    }
+}
+
 static void put_objects(saver *s, uint8_t *bytes)
 {
     const umb_committed *c = s->committed;
     for (uint32_t i = 0; i < c->object_count; ++i) {
         const umb_object *o = &c->objects[i];
-        for (int k = 0; k < 3; ++k) {
-            put_float(s, o->bounds.min[k]);
-        }
-        for (int k = 0; k < 3; ++k) {
-            put_float(s, o->bounds.max[k]);
-        }
+        put_box(s, &o->bounds);
         put_transform(s, &o->transform);
         put_word(s, o->mesh != NULL ? s->table[find_mesh(s, o->mesh)] : UMB_NONE);
         put_word(s, (o->used ? UMB_CAPTURE_USED : 0u) | (o->live ? UMB_CAPTURE_LIVE : 0u) |
@@ -237,6 +282,33 @@ static void put_candidates(saver *s)
         uint32_t first = 32 * i, left = count > first ? count - first : 0;
         uint32_t known = left >= 32 ? ~0u : (1u << left) - 1u;
         put_word(s, left > 0 ? s->candidates[i] & known : 0);
+    }
+}
+
+static void put_motion(saver *s, uint8_t *bytes)
+{
+    const umb_motion *m = &s->committed->motion;
+    s->at = bytes + s->offsets[UMB_CAPTURE_MOVERS];
+    for (uint32_t i = 0; i < s->mover_count; ++i) {
+        uint32_t object = m->objects[s->movers[i]];
+        put_word(s, object);
+        put_word(s, (s->committed->objects[object].exact ? UMB_CAPTURE_EXACT_MOVER : 0u) |
+                        (umb_scene_is_fuzzy(s->scene, s->movers[i]) ? UMB_CAPTURE_FUZZY : 0u));
+    }
+    s->at = bytes + s->offsets[UMB_CAPTURE_EXPIRIES];
+    for (uint32_t i = 0; i < m->expiry_count; ++i) {
+        put_doubles(s, &m->expiries[i].until, 1);
+        put_word(s, s->mover_numbers[m->expiries[i].mover]);
+    }
+    s->at = bytes + s->offsets[UMB_CAPTURE_EXACT];
+    for (uint32_t i = 0; i < m->exact_count; ++i) {
+        put_word(s, s->mover_numbers[m->exact[i]]);
+    }
+    s->at = bytes + s->offsets[UMB_CAPTURE_POSES];
+    for (uint32_t i = 0; i < s->pose_count; ++i) {
+        put_word(s, s->poses[i]->object);
+        put_transform(s, &s->poses[i]->pose.transform);
+        put_box(s, &s->poses[i]->pose.bounds);
     }
 }
 
@@ -266,6 +338,7 @@ static void put_all(saver *s, uint8_t *bytes)
     }
     s->at = bytes + s->offsets[UMB_CAPTURE_CANDIDATES];
     put_candidates(s);
+    put_motion(s, bytes);
     s->at = bytes + s->offsets[UMB_CAPTURE_ANSWER];
     for (uint32_t i = 0; i < s->answer_count; ++i) {
         put_word(s, s->answer[i]);
@@ -294,13 +367,13 @@ umb_result umb_capture_save(const umb_culler *culler, void *bytes, size_t capaci
     s.scene = umb_index_scene(index);
     s.committed = umb_scene_committed(s.scene);
     s.tree = umb_index_tree(index);
-    if (s.committed->motion.count > 0) {
+    if (!isfinite(s.committed->motion.time)) {
         return umb_error_set(umb_culler_settings(culler).error, UMB_ERROR_STATE,
-                             "captures hold no objects that move by themselves: end their motions first");
+                             "nothing to capture: the last commit failed; commit again");
     }
     umb_scratch scratch = {.allocator = umb_scene_allocator(s.scene)};
     umb_result result = UMB_OK;
-    if (!gather_meshes(&s, &scratch)) {
+    if (!gather_meshes(&s, &scratch) || !gather_movers(&s, &scratch)) {
         result = umb_error_set(umb_culler_settings(culler).error, UMB_ERROR_MEMORY,
                                "no memory for a capture");
     } else {

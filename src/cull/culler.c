@@ -67,6 +67,7 @@ struct umb_culler {
     bool answered;
     umb_view view;    /* of the last answer */
     uint64_t version; /* of the scene that it was given for */
+    uint64_t commit;  /* after which it was given: the next one takes what was told of moving objects */
 };
 
 /* One frame's state. */
@@ -987,6 +988,7 @@ umb_result umb_cull(umb_culler *c, const umb_view *view, umb_visible_set *out)
     finish(&w);
     c->view = *view;
     c->version = w.scene->version;
+    c->commit = c->movers.commit;
     c->answered = true;
     out->objects = c->objects;
     out->inside = c->inside;
@@ -1074,6 +1076,12 @@ const uint32_t *umb_culler_candidates(const umb_culler *culler, uint32_t *object
     return culler->filter.restricted ? culler->filter.candidates : NULL;
 }
 
+const umb_posed *umb_culler_posed(const umb_culler *culler, uint32_t *count)
+{
+    *count = culler->movers.posed_count;
+    return culler->movers.posed;
+}
+
 umb_culler_def umb_culler_settings(const umb_culler *culler)
 {
     return culler->def;
@@ -1083,6 +1091,8 @@ const umb_view *umb_culler_last_view(const umb_culler *culler, const uint32_t **
 {
     *ids = culler->objects;
     *count = culler->count;
-    bool current = umb_scene_committed(umb_index_scene(culler->index))->version == culler->version;
+    const umb_committed *scene = umb_scene_committed(umb_index_scene(culler->index));
+    bool current = scene->version == culler->version &&
+                   (scene->motion.count == 0 || culler->movers.commit == culler->commit);
     return culler->answered && current ? &culler->view : NULL;
 }

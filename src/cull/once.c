@@ -1,5 +1,6 @@
 #include "once.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "found.h"
@@ -39,24 +40,24 @@ void umb_once_free(umb_once *o, const umb_allocator *a)
     *o = (umb_once){0};
 }
 
-/* Where an object is, or its volume; *lost: nobody knows. */
-static const umb_aabb *whole_box(const umb_once_view *v, uint32_t id, bool *lost)
-{
-    const umb_object *o = &v->scene->objects[id];
-    const umb_posed *p = v->movers != NULL && umb_movers_roams(v->movers, o) ? umb_movers_find(v->movers, o->mover) : NULL;
-    *lost = p != NULL && !p->known;
-    return p != NULL && p->known ? &p->bounds : &o->bounds;
-}
+/* Eight boxes that are no object's place: a bit for each whose object is in view wherever it is, for nobody knows, and for
+ * each that does not even hold it any more. */
+typedef struct lost_boxes {
+    uint32_t all, empty;
+} lost_boxes;
 
-/* Eight whole boxes as a node. Returns a bit for each one that is no object's, but in view wherever it is. */
-static uint32_t gather(const umb_once_view *v, const uint32_t *ids, uint32_t count, umb_node *out)
+/* Eight whole boxes as a node: where the objects are, or their volumes. */
+static lost_boxes gather(const umb_once_view *v, const uint32_t *ids, uint32_t count, umb_node *out)
 {
-    uint32_t lost = 0;
+    lost_boxes lost = {0, 0};
     out->count = count;
     for (uint32_t slot = 0; slot < UMB_NODE_WIDTH; ++slot) {
-        bool is_lost;
-        const umb_aabb *box = whole_box(v, ids[slot < count ? slot : 0], &is_lost);
-        lost |= is_lost ? 1u << slot : 0;
+        const umb_object *o = &v->scene->objects[ids[slot < count ? slot : 0]];
+        bool roams = v->movers != NULL && umb_movers_roams(v->movers, o);
+        const umb_posed *p = roams ? umb_movers_find(v->movers, o->mover) : NULL;
+        const umb_aabb *box = p != NULL && p->known ? &p->bounds : &o->bounds;
+        lost.all |= p != NULL && !p->known ? 1u << slot : 0;
+        lost.empty |= p != NULL && !p->known && p->expired ? 1u << slot : 0;
         for (int i = 0; i < 3; ++i) {
             out->min[i][slot] = box->min[i];
             out->max[i][slot] = box->max[i];
@@ -75,7 +76,8 @@ uint32_t umb_once_finish(const umb_once_view *v, const uint32_t *ids, uint32_t c
         umb_projected projected;
         uint16_t left[UMB_NODE_WIDTH];
         memcpy(batch, ids + i, n * sizeof batch[0]);
-        uint32_t in = gather(v, batch, n, &node);
+        lost_boxes lost = gather(v, batch, n, &node);
+        uint32_t in = lost.all;
         in |= ~umb_frustum_test_node(v->frustum, v->kernels, &node, v->frustum->all_planes, NULL, left);
         in &= (1u << n) - 1u;
         if (entries != NULL) {
@@ -83,11 +85,13 @@ uint32_t umb_once_finish(const umb_once_view *v, const uint32_t *ids, uint32_t c
         }
         for (; in != 0; in &= in - 1) {
             uint32_t slot = (uint32_t)__builtin_ctz(in);
+            bool empty = (lost.empty >> slot & 1u) != 0, whole = left[slot] == 0 && !empty;
             if (entries != NULL) {
-                entries[written++] = umb_found_entry(projected.w_min[slot], batch[slot], left[slot] == 0);
+                float key = empty ? -INFINITY : projected.w_min[slot];
+                entries[written++] = umb_found_entry(key, batch[slot], whole);
             } else {
                 objects[written] = batch[slot];
-                inside[written++] = left[slot] == 0;
+                inside[written++] = whole;
             }
         }
     }

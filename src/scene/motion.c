@@ -584,6 +584,11 @@ void umb_motion_committed(umb_scene *scene)
 
 /* ---- the rest ------------------------------------------------------------------------------- */
 
+bool umb_scene_is_fuzzy(const umb_scene *scene, uint32_t mover)
+{
+    return scene->moving.promises[mover].def.fuzzy;
+}
+
 void umb_scene_get_motion_stats(const umb_scene *scene, umb_motion_stats *out)
 {
     const umb_movers_state *m = &scene->moving;

@@ -73,6 +73,9 @@ typedef struct umb_scene_witness {
 void umb_scene_add_witness(umb_scene *scene, umb_scene_witness *witness);
 void umb_scene_remove_witness(umb_scene *scene, umb_scene_witness *witness);
 
+/* True if the promise of a mover is not certain. */
+bool umb_scene_is_fuzzy(const umb_scene *scene, uint32_t mover);
+
 const umb_committed *umb_scene_committed(const umb_scene *scene);
 
 /* Indices register to be brought up to date by commits: update is called at the end of each. */
