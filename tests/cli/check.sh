@@ -27,3 +27,12 @@ run check $scene $rows --every 16 --moving 0.5,3 --step 0.7 --grid 128x64 --rays
 jq -c '[.class, .wrongly_hidden, .reported_visible > 0]' out
 run walk $scene $rows --moving 0.5,3 --json
 jq -c '.frames[1:] | [(map(.stats.hidden_movers) | add) > 2 * (map(.stats.poses) | add), (map(.stats.expired + .stats.strays) | add)]' out
+
+# Without some objects the oracle looks at a scene that lacks them; asked about some, the rest still hides.
+run check $scene $rows --every 16 --without 0-30,77 --grid 128x64 --rays 50k --json
+jq -c '[.class, .wrongly_hidden, .reported_visible > 0]' out
+"$umbrage" cull $scene $rows --row 5 --json --list | jq -c '[.ids[] | select(. <= 40 or . == 100)]' >few
+"$umbrage" cull $scene $rows --row 5 --only 0-40,100 --json --list | jq -c .ids | same "only" few -
+"$umbrage" cull $scene $rows --row 5 --without 0-40,100 --json --list | jq -c '[.ids[] | select(. <= 40 or . == 100)]'
+run check $scene $rows --every 16 --only 50-200 --moving 0.3,2 --step 0.5 --grid 128x64 --rays 50k --json
+jq -c '[.wrongly_hidden, .reported_visible > 0]' out

@@ -16,6 +16,13 @@ run cull gen:city,triangles=10k --path gen:city,triangles=10k --row 7 --capture 
 run replay city.umb --threads 2 --isa scalar
 sed -E 's/[0-9]+|hash [0-9a-f]+/N/g' out
 
+# In motion, with objects left out and candidates.
+for method in raster none planes; do
+    run cull scene.glb $view --method $method --moving 0.6,4 --step 0.4 --without 7 --only 0-300 --capture moving.umb --json
+    run replay moving.umb --json
+    jq -c '[.same, .differences, .method]' out
+done
+
 size=$(wc -c <frame.umb)
 for cut in 1 16 100 $((size / 2)) $((size - 1)); do
     head -c $cut frame.umb >short.umb

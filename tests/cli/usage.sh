@@ -97,7 +97,12 @@ run walk $scene --path gen:blocks --moving 2,1
 run walk $scene --path gen:blocks --moving 0.5
 run check $scene --path gen:blocks --step 1
 run check $scene --path gen:blocks --moving 0.5,1 --step 0
-run cull $scene $view --moving 0.5,1
+run explain $scene $view --object 1 --moving 0.5,1
+run cull $scene $view --only 1,
+run cull $scene $view --only 5-3
+run cull $scene $view --only 4000
+run cull $scene $view --without ""
+run walk $scene --path gen:blocks --without 1-4294967296
 run walk $scene
 run walk $scene --path gen:blocks --from 64
 run walk $scene --path gen:blocks --from 5 --to 4

@@ -8,6 +8,7 @@
 #include "moving.h"
 #include "part_file.h"
 #include "progress.h"
+#include "selection.h"
 #include "truth/truth.h"
 
 /* Counts for one kind of renderer, or for the union of both. */
@@ -72,10 +73,12 @@ static void count(tally *t, bool witness, bool confirmed, bool hidden)
 }
 
 /* Compare one answer with the truth; hidden has a byte for each object. */
-static bool compare(check *c, checked *v, const truth_result *r, const uint8_t *hidden,
-                    uint32_t objects)
+static bool compare(const setup *s, check *c, checked *v, const truth_result *r, const uint8_t *hidden)
 {
-    for (uint32_t i = 0; i < objects; ++i) {
+    for (uint32_t i = 0; i < s->model->object_count; ++i) {
+        if (!selection_asks(s, i)) {
+            continue;
+        }
         const truth_witness *culling = &r->culling[i], *two_sided = &r->two_sided[i];
         bool seen[2] = {culling->renderers != 0, two_sided->renderers != 0};
         bool sure[2] = {seen[0] && culling->confirmed, seen[1] && two_sided->confirmed};
@@ -111,7 +114,9 @@ static int check_view(setup *s, const options *o, truth *oracle, const umb_view 
     if (code != EXIT_DONE) {
         return code;
     }
-    memset(hidden, 1, objects);
+    for (uint32_t i = 0; i < objects; ++i) {
+        hidden[i] = selection_asks(s, i);
+    }
     for (uint32_t i = 0; i < set.count; ++i) {
         hidden[set.objects[i]] = 0;
     }
@@ -129,7 +134,7 @@ static int check_view(setup *s, const options *o, truth *oracle, const umb_view 
     }
     out->rays = result.rays;
     out->budget_spent = result.budget_spent;
-    bool good = compare(c, out, &result, hidden, objects);
+    bool good = compare(s, c, out, &result, hidden);
     truth_result_free(&result);
     return good ? EXIT_DONE : fail(o, EXIT_INPUT, "not enough memory");
 }
@@ -149,6 +154,7 @@ static void add_total(check *c, const checked *v)
 static int check_all(setup *s, const options *o, const views *v, check *c)
 {
     umb_error error = {0};
+    selection_strip_model(s);
     truth *oracle = truth_create(s->model, &error);
     uint8_t *hidden = malloc((size_t)s->model->object_count + 1);
     c->count = v->count;

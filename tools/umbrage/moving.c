@@ -117,7 +117,7 @@ void moving_pose_model(setup *s, double time)
     const moving *m = s->moving;
     for (uint32_t i = 0; i < m->model->object_count; ++i) {
         model_object *o = &s->model->objects[i];
-        if (!m->moves[i]) {
+        if (!m->moves[i] || o->mesh == MODEL_NONE) {
             continue;
         }
         o->transform = transform_at(m, i, time);

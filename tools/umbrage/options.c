@@ -395,6 +395,18 @@ static const char *read_rays(options *o, const char *text)
     return none ? "a number of rays" : "a number of rays from 1";
 }
 
+static const char *read_only(options *o, const char *text)
+{
+    o->only = text;
+    return *text ? NULL : "numbers of objects and ranges of them: 3,17,40-60";
+}
+
+static const char *read_without(options *o, const char *text)
+{
+    o->without = text;
+    return *text ? NULL : "numbers of objects and ranges of them: 3,17,40-60";
+}
+
 static const char *read_object(options *o, const char *text)
 {
     return count(text, 0, UINT32_MAX - 1, &o->object) ? NULL : "an object's number, from 0";
@@ -477,8 +489,10 @@ static const option_spec specs[] = {
     {"umbrae", 0, BIT(REGION), "K", read_umbrae, "intervals kept a direction, 1 to 8 (default 2)"},
     {"outer", 0, BIT(REGION), "R", read_outer, "rays by two squares, the outer R times the inner (default: slabs)"},
     {"half-umbra", 0, BIT(REGION), NULL, read_flag, "only what stands on the ground hides, and only its top counts"},
-    {"moving", 0, MANY_VIEWS, "P,V", read_moving, "a part P of the objects goes round by itself, V units a second"},
-    {"step", 0, MANY_VIEWS, "S", read_step, "--moving: seconds from row to row (default 1/60)"},
+    {"only", 0, BIT(CULL) | MANY_VIEWS, "IDS", read_only, "ask about these objects alone: 3,17,40-60; the others still hide"},
+    {"without", 0, BIT(CULL) | MANY_VIEWS, "IDS", read_without, "as if these objects were not there: they hide nothing"},
+    {"moving", 0, BIT(CULL) | MANY_VIEWS, "P,V", read_moving, "a part P of the objects goes round by itself, V units a second"},
+    {"step", 0, BIT(CULL) | MANY_VIEWS, "S", read_step, "--moving: seconds from row to row (default 1/60)"},
     {"up", 0, VIEWS | BIT(REGION), "DIR", read_up, "up: x, y, z or X,Y,Z (default: as info says)"},
     {"fov", 0, VIEWS, "DEG", read_fov, "vertical field of view (default 60)"},
     {"ortho", 0, VIEWS, "HEIGHT", read_ortho, "parallel lines; height of the view instead of --fov"},

@@ -33,6 +33,7 @@ typedef struct options {
     model_options model;
     const char *seed; /* digits, or NULL */
     const char *path, *output, *capture;
+    const char *only, *without; /* lists of objects; NULL: not given */
 
     double eye[3], target[3], up[3];
     double fov, ortho_height, near_depth, far_depth, min_pixels;

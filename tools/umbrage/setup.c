@@ -7,6 +7,7 @@
 
 #include "moving.h"
 #include "progress.h"
+#include "selection.h"
 
 /* ---- scene ---------------------------------------------------------------------------------- */
 
@@ -63,6 +64,19 @@ int setup_model(setup *s, const options *o)
     return EXIT_DONE;
 }
 
+/* What is told of the objects once they are in, then the weld that had to wait for it. */
+static int complete_scene(setup *s, const options *o, bool weld)
+{
+    int code = selection_start(s, o);
+    if (code != EXIT_DONE || options_given(o, "moving")) {
+        return code == EXIT_DONE ? moving_start(s, o, weld) : code;
+    }
+    umb_weld_def def = {.tasks = s->tasks};
+    umb_result result = weld && o->without ? umb_scene_weld(s->scene, &def, &s->weld) : UMB_OK;
+    result = result == UMB_OK ? umb_scene_commit(s->scene) : result;
+    return result == UMB_OK ? EXIT_DONE : fail(o, EXIT_INPUT, "%s: %s", o->input, umb_result_name(result));
+}
+
 int setup_scene(setup *s, const options *o)
 {
     int code = setup_model(s, o);
@@ -76,13 +90,13 @@ int setup_scene(setup *s, const options *o)
         }
         s->tasks = umb_pool_tasks(s->pool);
     }
-    bool weld = !options_given(o, "no-weld"), moves = options_given(o, "moving");
+    bool weld = !options_given(o, "no-weld"), later = options_given(o, "moving") || o->without;
     progress_note(o, "building scene and index");
-    s->scene = model_scene(s->model, weld && !moves, s->tasks, &s->weld, &s->error);
+    s->scene = model_scene(s->model, weld && !later, s->tasks, &s->weld, &s->error);
     if (!s->scene) {
         return fail(o, EXIT_INPUT, "%s: %s", o->input, s->error.text);
     }
-    code = moves ? moving_start(s, o, weld) : EXIT_DONE;
+    code = complete_scene(s, o, weld);
     if (code != EXIT_DONE) {
         return code;
     }
@@ -114,6 +128,8 @@ static int setup_cullers(setup *s, const options *o)
     if (result == UMB_OK) {
         result = umb_culler_create(s->index, &def, &s->frustum);
     }
+    result = result == UMB_OK ? selection_restrict(s, s->culler) : result;
+    result = result == UMB_OK ? selection_restrict(s, s->frustum) : result;
     return result == UMB_OK ? EXIT_DONE
                             : fail(o, EXIT_INPUT, "the culler: %s", umb_result_name(result));
 }
@@ -125,6 +141,7 @@ void setup_free(setup *s)
     umb_index_destroy(s->index);
     umb_scene_destroy(s->scene);
     moving_free(s->moving);
+    selection_free(s->selection);
     umb_pool_destroy(s->pool);
     model_free(s->model);
     memset(s, 0, sizeof *s);
@@ -264,5 +281,6 @@ umb_view setup_view(const setup *s, const options *o, const views *v, uint32_t k
     umb_error error;
     setup_make_view(s->model, o, v->path.rows[setup_row(v, k)], &view, &error);
     view.time = setup_row(v, k) * o->step;
+    selection_mask_view(s, &view);
     return view;
 }

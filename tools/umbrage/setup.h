@@ -5,11 +5,13 @@
 #include "options.h"
 
 typedef struct moving moving; /* moving.h */
+typedef struct selection selection; /* selection.h */
 
 typedef struct setup {
     model *model;
     umb_scene *scene;
     moving *moving;      /* with --moving, else NULL */
+    selection *selection; /* with --only or --without, else NULL */
     umb_index *index;
     umb_culler *culler;  /* the method that was asked for */
     umb_culler *frustum; /* method none: what meets the frustum at all */
