@@ -196,6 +196,10 @@ static void show(umb_index *index)
     tree->blocks = index->blocks;
     tree->volumes = index->volumes.list;
     tree->opened = index->updater.opened;
+    tree->touched = index->edit.touched;
+    tree->touched_count = index->edit.touched_count;
+    tree->places = index->edit.places;
+    tree->occluder_places = index->edit.occluder_places;
 }
 
 /* What readers see, from the nodes. */
@@ -366,6 +370,7 @@ static bool follow(umb_index *index, const umb_committed *c)
     if (c->moved_count > 0 || grew) {
         index->tree.orders = NULL; /* what moved may be in other cells now */
     }
+    e->touched_count = 0;
     if (!umb_update_follow(&index->updater, e, c, grew)) {
         e->failed = true;
         return false;

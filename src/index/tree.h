@@ -88,6 +88,8 @@ typedef struct umb_range {
 /* The count of a range that is none: objects below the node have to be looked for. */
 #define UMB_RANGE_STALE UINT32_MAX
 
+#define UMB_TOUCHED_ALL UINT32_MAX
+
 /* So many entries behind the list of objects may be read, too. */
 #define UMB_TREE_SPARE 8
 
@@ -118,6 +120,13 @@ typedef struct umb_tree {
     uint32_t block_count; /* the last one holds all */
     /* Where walks note the nodes that they open, a bit each; NULL: nobody wants to know (UMB_UPDATE_LAZY). */
     uint64_t *opened;
+    /* Nodes whose slots name something else than at the version before, some of them more than once, in no order. Boxes may
+     * have changed anywhere. */
+    const uint32_t *touched;
+    uint32_t touched_count; /* UMB_TOUCHED_ALL: it may be any */
+    /* Where items are, the first of their places if there are several, as 8 * node + slot: objects, stand-alone occluders by
+     * number. */
+    const uint32_t *places, *occluder_places;
     umb_aabb bounds;       /* of all items; zero when empty */
     uint64_t version;      /* of the commit it shows. Behind the scene's only after an update that found no
                               memory: answers would then be wrong, so readers refuse (UMB_ERROR_STATE) */

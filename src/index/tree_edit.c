@@ -132,6 +132,15 @@ static void count(umb_tree_edit *e, uint32_t node, uint32_t under, uint32_t by)
 
 /* ---- slots ---------------------------------------------------------------------------------- */
 
+static void touch(umb_tree_edit *e, uint32_t number)
+{
+    if (e->touched_count < e->touched_capacity) {
+        e->touched[e->touched_count++] = number;
+    } else {
+        e->touched_count = UMB_TOUCHED_ALL;
+    }
+}
+
 static void write_slot(umb_tree_edit *e, uint32_t number, uint32_t slot, const umb_aabb *box, uint32_t ref)
 {
     umb_node *node = &e->nodes[number];
@@ -144,6 +153,7 @@ static void write_slot(umb_tree_edit *e, uint32_t number, uint32_t slot, const u
         umb_tree_edit_link(e, ref, number * UMB_NODE_WIDTH + slot);
     }
     umb_bvh_mark(&e->marks, number);
+    touch(e, number);
 }
 
 /* Into a free slot. */
@@ -169,6 +179,7 @@ static void cut_slot(umb_tree_edit *e, uint32_t number, uint32_t slot)
     }
     node->ref[last] = UMB_NONE;
     umb_bvh_mark(&e->marks, number);
+    touch(e, number);
 }
 
 /* What the only slot of a node names takes the node's place in its parent. */
@@ -461,6 +472,7 @@ bool umb_tree_edit_close_gaps(umb_tree_edit *e, umb_number_set *set)
         e->below[k].count = UMB_RANGE_STALE;
     }
     e->stale += e->slot_count;
+    e->touched_count = UMB_TOUCHED_ALL;
     link_all(e);
     return true;
 }
@@ -500,6 +512,7 @@ void umb_tree_edit_learn(umb_tree_edit *e)
 }
 
 #define MOST_WORN 256
+#define MOST_TOUCHED 16384
 
 bool umb_tree_edit_adopt(umb_tree_edit *e, umb_node *nodes, uint32_t node_count, size_t node_capacity, bool several,
                          const umb_committed *scene)
@@ -510,7 +523,8 @@ bool umb_tree_edit_adopt(umb_tree_edit *e, umb_node *nodes, uint32_t node_count,
     size_t next = several ? node_capacity * UMB_NODE_WIDTH : 0;
     if (!umb_memory_reserve(a, (void **)&e->next, &e->next_capacity, next, sizeof *e->next) || !reserve_beside(e) ||
         !umb_tree_edit_reserve_places(e, scene) ||
-        !umb_memory_reserve(a, (void **)&e->worn, &e->worn_capacity, MOST_WORN, sizeof *e->worn)) {
+        !umb_memory_reserve(a, (void **)&e->worn, &e->worn_capacity, MOST_WORN, sizeof *e->worn) ||
+        !umb_memory_reserve(a, (void **)&e->touched, &e->touched_capacity, MOST_TOUCHED, sizeof *e->touched)) {
         e->node_capacity = old.node_capacity;
         return false;
     }
@@ -527,6 +541,7 @@ bool umb_tree_edit_adopt(umb_tree_edit *e, umb_node *nodes, uint32_t node_count,
     forget_places(e->places, e->place_capacity);
     forget_places(e->occluder_places, e->occluder_capacity);
     e->worn_count = 0;
+    e->touched_count = UMB_TOUCHED_ALL;
     e->stale = 0;
     e->failed = false;
     umb_tree_edit_learn(e);
@@ -548,6 +563,7 @@ void umb_tree_edit_free(umb_tree_edit *e)
     umb_memory_free(a, e->splits, e->split_capacity * sizeof *e->splits);
     umb_memory_free(a, e->numbers, e->number_capacity * sizeof *e->numbers);
     umb_memory_free(a, e->worn, e->worn_capacity * sizeof *e->worn);
+    umb_memory_free(a, e->touched, e->touched_capacity * sizeof *e->touched);
     umb_bvh_marks_free(&e->marks, a);
     umb_number_set_free(&e->free, a);
     *e = (umb_tree_edit){.allocator = a};
@@ -556,8 +572,8 @@ void umb_tree_edit_free(umb_tree_edit *e)
 size_t umb_tree_edit_memory(const umb_tree_edit *e)
 {
     return e->node_capacity * sizeof *e->nodes + e->below_capacity * sizeof *e->below +
-           (e->place_capacity + e->occluder_capacity + e->next_capacity + e->number_capacity + e->worn_capacity) *
-               sizeof(uint32_t) +
+           (e->place_capacity + e->occluder_capacity + e->next_capacity + e->number_capacity + e->worn_capacity +
+            e->touched_capacity) * sizeof(uint32_t) +
            e->item_capacity * sizeof *e->items + e->split_capacity * sizeof *e->splits +
            umb_bvh_marks_memory(&e->marks) + umb_number_set_memory(&e->free);
 }

@@ -32,6 +32,11 @@ typedef struct umb_tree_edit {
     uint32_t *numbers;
     uint32_t *worn; /* roots of subtrees that have seen many edits */
     uint32_t worn_count;
+    /* Nodes whose slots name something else than before the last commit, some of them more than once; the count is
+     * UMB_TOUCHED_ALL if it may be any. */
+    uint32_t *touched;
+    uint32_t touched_count;
+    size_t touched_capacity;
     size_t node_capacity, below_capacity, mark_capacity, place_capacity, occluder_capacity, next_capacity;
     size_t item_capacity, split_capacity, number_capacity, worn_capacity;
     size_t room;    /* nodes that all arrays have room for */

@@ -126,8 +126,7 @@ static umb_result choose(void *state, const umb_choice *choice)
     planes *p = state;
     uint32_t wanted = choice->budget != 0 ? choice->budget : CHOSEN;
     wanted = wanted < UINT16_MAX ? wanted : UINT16_MAX - 1;
-    if ((choice->coherence & UMB_COHERENCE_REST) != 0 && p->selector.known &&
-        p->selector.structure == choice->scene->structure) {
+    if ((choice->coherence & UMB_COHERENCE_REST) != 0 && p->selector.rest_structure == choice->scene->structure) {
         tell_selector(p);
     }
     p->choice = choice;

@@ -6,9 +6,8 @@
 #ifndef UMB_SELECT_H
 #define UMB_SELECT_H
 
-#include "facets.h"
 #include "frustum/box_kernels.h"
-#include "method.h"
+#include "occluder_sets.h"
 
 /* By what candidates are ranked (measure.h). */
 typedef enum umb_select_by {
@@ -41,25 +40,12 @@ typedef struct umb_rest {
     uint8_t idle;   /* how often on end it hid nothing */
 } umb_rest;
 
-/* What is known of a scene's occluders, and the search that goes on. */
+/* The search among what is known of a scene's occluders. */
 typedef struct umb_selector {
-    umb_allocator allocator;
-    umb_facets *sets;      /* one for each mesh that is an occluder; the last one is of all welded surfaces */
-    uint32_t set_count;
-    uint32_t *set_of;      /* per occluder */
-    umb_facet_source soup; /* of the welded surfaces; owned */
-    uint32_t *soup_tags;
-    uint8_t *soup_sides;
-    uint32_t soup_positions;
-    uint32_t *soup_first;  /* per occluder: its first facet in the last set; the end is the next one's */
-    float *areas;          /* per occluder: bounds of the area that it can show */
-    float *node_areas;     /* per node and block: the largest below it */
-    size_t set_capacity, of_capacity, first_capacity, area_capacity, node_capacity;
-    size_t soup_position_capacity, soup_triangle_capacity, soup_tag_capacity, soup_side_capacity;
-    uint64_t structure, version;
-    bool known;            /* structure is what the above was made for */
+    umb_occluder_sets known;
     umb_rest *rests;       /* per occluder */
     size_t rest_capacity;
+    uint64_t rest_structure; /* of the scene that they are for */
     uint32_t frame;
     umb_select_by by;
     /* the search */
