@@ -25,6 +25,7 @@ target_link_libraries(umb_test_support PUBLIC ${UMB_INSIDE} PRIVATE PkgConfig::J
 
 # Tests of which one program is run in several parts, side by side.
 set(UMB_TEST_PARTS_test_scenes 2)
+set(UMB_TEST_PARTS_test_scenes_by_index 2)
 
 # tests/test_NAME.c is one program. They may look inside src/ and tools/.
 file(GLOB UMB_TEST_SOURCES CONFIGURE_DEPENDS tests/test_*.c)
