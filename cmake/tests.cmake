@@ -21,7 +21,7 @@ endfunction()
 file(GLOB UMB_SUPPORT_SOURCES CONFIGURE_DEPENDS tests/support/*.c)
 add_library(umb_test_support STATIC ${UMB_SUPPORT_SOURCES})
 target_include_directories(umb_test_support PUBLIC tests PRIVATE src)
-target_link_libraries(umb_test_support PUBLIC ${UMB_INSIDE} PRIVATE PkgConfig::JANSSON m)
+target_link_libraries(umb_test_support PUBLIC ${UMB_INSIDE} PRIVATE PkgConfig::CMOCKA PkgConfig::JANSSON m)
 
 # Tests of which one program is run in several parts, side by side.
 set(UMB_TEST_PARTS_test_scenes 2)

@@ -84,21 +84,10 @@ static void by_box(const umb_scene *scene, const umb_view *v, uint8_t found[MOST
         if (!umb_scene_object_bounds(scene, i, &box)) {
             continue;
         }
-        uint16_t left[8];
-        umb_node node = node_of(&box, 1);
-        uint32_t outside =
-            umb_frustum_test_node(&f, umb_box_kernels_get(UMB_ISA_SCALAR), &node, f.all_planes, NULL, left);
-        bool small = v->min_pixels > 0.0 && umb_contribution_small(v, &box);
-        found[i] = (outside & 1u) != 0 || small ? 0 : left[0] != 0 ? 1 : 2;
-        reference r[UMB_FRUSTUM_PLANES];
-        uint32_t planes = references(v, &box, r);
-        bool touches = !small, within = true;
-        for (uint32_t k = 0; k < planes; ++k) {
-            touches = touches && r[k].most >= 0x1p-58L * r[k].size;
-            within = within && r[k].least > -0x1p-58L * r[k].size;
-        }
-        assert_true(!touches || found[i] != 0);
-        assert_true(found[i] != 2 || within);
+        bool small = v->min_pixels > 0.0 && umb_contribution_small(v, &box), sound;
+        uint8_t place = place_of_box(v, &f, &box, &sound);
+        found[i] = small ? 0 : place;
+        assert_true(sound);
     }
 }
 

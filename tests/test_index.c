@@ -11,227 +11,18 @@
 
 #include "frustum/box_kernels.h"
 #include "index/bvh.h"
-#include "support/random_boxes.h"
-
-/* ---- checking a tree ---------------------------------------------------------------------------- */
-
-static bool contains(const umb_aabb *outer, const umb_aabb *inner)
-{
-    for (int i = 0; i < 3; ++i) {
-        if (!(outer->min[i] <= inner->min[i] && inner->max[i] <= outer->max[i])) {
-            return false;
-        }
-    }
-    return true;
-}
-
-static umb_aabb slot_box(const umb_node *n, uint32_t s)
-{
-    umb_aabb b;
-    for (int i = 0; i < 3; ++i) {
-        b.min[i] = n->min[i][s];
-        b.max[i] = n->max[i][s];
-    }
-    return b;
-}
-
-static void check_padding(const umb_node *n)
-{
-    assert_in_range(n->count, 1, UMB_NODE_WIDTH);
-    umb_aabb first = slot_box(n, 0);
-    for (uint32_t s = n->count; s < UMB_NODE_WIDTH; ++s) {
-        umb_aabb b = slot_box(n, s);
-        assert_memory_equal(&b, &first, sizeof(b));
-        assert_int_equal(n->ref[s], UMB_NONE);
-    }
-}
-
-/* Walk from the root; seen counts how often each object and each occluder is met. */
-static uint32_t walk(const umb_tree *t, const umb_committed *c, uint32_t node, uint8_t *objects,
-                     uint8_t *occluders)
-{
-    const umb_node *n = &t->nodes[node];
-    uint32_t nodes = 1;
-    check_padding(n);
-    assert_int_equal((uintptr_t)n % 64, 0);
-    for (uint32_t s = 0; s < n->count; ++s) {
-        uint32_t number = n->ref[s] & UMB_REF_NUMBER;
-        umb_aabb box = slot_box(n, s);
-        switch (n->ref[s] & UMB_REF_KIND) {
-        case UMB_REF_NODE: {
-            assert_true(number > node && number < t->node_count);
-            assert_int_equal(t->nodes[number].parent, node);
-            assert_int_equal(t->nodes[number].slot, s);
-            umb_aabb below = umb_node_bounds(&t->nodes[number]);
-            assert_memory_equal(&box, &below, sizeof(box));
-            nodes += walk(t, c, number, objects, occluders);
-            break;
-        }
-        case UMB_REF_OBJECT:
-            assert_true(number < c->object_count && c->objects[number].live);
-            assert_memory_equal(&box, &c->objects[number].bounds, sizeof(box));
-            ++objects[number];
-            break;
-        case UMB_REF_OCCLUDER:
-            assert_true(number >= c->first_free_occluder && number < c->occluder_count);
-            assert_memory_equal(&box, &c->occluders[number].bounds, sizeof(box));
-            ++occluders[number];
-            break;
-        default:
-            fail_msg("a reference of no kind");
-        }
-    }
-    return nodes;
-}
-
-static uint64_t mix(uint32_t object)
-{
-    return (object + 1u) * 0x9E3779B97F4A7C15u;
-}
-
-/* The objects below a node are those of its range, in any order: as many, with the same sum. A range may be
- * stale. Returns the sum. */
-static uint64_t check_ranges(const umb_tree *t, uint32_t node, uint32_t *count)
-{
-    const umb_node *n = &t->nodes[node];
-    umb_range range = t->below[node];
-    uint64_t sum = 0, listed = 0;
-    uint32_t first = *count;
-    for (uint32_t s = 0; s < n->count; ++s) {
-        uint32_t number = n->ref[s] & UMB_REF_NUMBER;
-        if ((n->ref[s] & UMB_REF_KIND) == UMB_REF_NODE) {
-            sum += check_ranges(t, number, count);
-        } else if ((n->ref[s] & UMB_REF_KIND) == UMB_REF_OBJECT) {
-            sum += mix(number);
-            *count += 1;
-        }
-    }
-    if (range.count != UMB_RANGE_STALE) {
-        for (uint32_t i = 0; i < range.count; ++i) {
-            listed += mix(t->objects[range.first + i]);
-        }
-        assert_int_equal(range.count, *count - first);
-        assert_true(listed == sum);
-    }
-    return sum;
-}
-
-/* Each block holds the boxes of the next eight rows or blocks, and its range is theirs together. */
-static void check_blocks(const umb_tree *t)
-{
-    uint32_t next = 0;
-    for (uint32_t k = 0; k < t->block_count; ++k) {
-        const umb_node *block = &t->blocks[k];
-        umb_range range = t->below[t->node_count + k];
-        check_padding(block);
-        for (uint32_t s = 0; s < block->count; ++s, ++next) {
-            assert_true(next < t->node_count + k);
-            assert_int_equal(block->ref[s], UMB_REF_NODE | next);
-            umb_aabb box = slot_box(block, s), below = umb_node_bounds(umb_tree_node(t, next));
-            assert_memory_equal(&box, &below, sizeof(box));
-            assert_int_equal(t->below[next].first, range.first);
-            range.first += t->below[next].count;
-            range.count -= t->below[next].count;
-        }
-        assert_int_equal(range.count, 0);
-    }
-    assert_int_equal(next, t->flat && t->node_count > 0 ? t->node_count + t->block_count - 1 : 0);
-}
-
-static void check_lists(const umb_tree *t)
-{
-    uint32_t at = 0;
-    for (uint32_t k = 0; k < t->node_count; ++k) {
-        if (t->nodes[k].parent == UMB_NONE && t->nodes[k].count > 0) {
-            check_ranges(t, k, &at);
-        }
-    }
-    assert_true(at <= t->object_count);
-    check_blocks(t);
-}
-
-static void check_index(const umb_index *index)
-{
-    const umb_tree *t = umb_index_tree(index);
-    const umb_committed *c = umb_scene_committed(umb_index_scene(index));
-    uint8_t *objects = calloc(c->object_count + 1, 1);
-    uint8_t *occluders = calloc(c->occluder_count + 1, 1);
-    uint32_t items = 0, nodes = 0;
-    assert_true(objects != NULL && occluders != NULL);
-    if (t->flat) {
-        for (uint32_t k = 0; k < t->node_count; ++k) {
-            assert_int_equal(walk(t, c, k, objects, occluders), 1);
-            assert_int_equal(t->nodes[k].parent, UMB_NONE);
-        }
-        nodes = t->node_count;
-    } else if (t->node_count > 0) {
-        assert_int_equal(t->nodes[0].parent, UMB_NONE);
-        nodes = walk(t, c, 0, objects, occluders);
-    }
-    assert_true(nodes <= t->node_count);
-    check_lists(t);
-    for (uint32_t i = 0; i < c->object_count; ++i) {
-        assert_int_equal(objects[i], c->objects[i].live);
-        items += objects[i];
-        assert_true(!c->objects[i].live || contains(&t->bounds, &c->objects[i].bounds));
-    }
-    for (uint32_t i = 0; i < c->occluder_count; ++i) {
-        assert_int_equal(occluders[i], i >= c->first_free_occluder);
-        items += occluders[i];
-    }
-    assert_int_equal(items, t->item_count);
-    assert_true(t->version == c->version);
-    umb_index_stats stats;
-    umb_index_get_stats(index, &stats);
-    assert_int_equal(stats.items, items);
-    assert_int_equal(stats.nodes, nodes);
-    assert_int_equal(stats.depth == 0, items == 0);
-    assert_true(stats.depth < 80 && stats.cost >= 0.0 && isfinite(stats.cost));
-    free(objects);
-    free(occluders);
-}
+#include "support/index_check.h"
+#include "support/index_sets.h"
 
 /* ---- scenes ------------------------------------------------------------------------------------- */
 
 enum { COUNT_LARGE = 60000 };
-enum { SPREAD, EQUAL, POINTS, COLLINEAR, GEOMETRIC, NESTED, ABSURD, SET_COUNT };
-
-static umb_aabb box_of_set(uint64_t *seed, int set, uint32_t i)
-{
-    static const double origin[3] = {0, 0, 0};
-    umb_aabb b = {{1, 2, 3}, {1, 2, 3}};
-    switch (set) {
-    case SPREAD:
-        return random_box(seed, origin, 100.0);
-    case EQUAL:
-        b.max[0] = 4;
-        b.max[1] = 5;
-        return b;
-    case POINTS:
-        return b;
-    case COLLINEAR:
-        b.min[0] = b.max[0] = (float)i;
-        return b;
-    case GEOMETRIC:
-        b.min[i % 3] = b.max[i % 3] = (float)ldexp(1.0, (int)(i / 3 % 250) - 125);
-        return b;
-    case NESTED:
-        for (int a = 0; a < 3; ++a) {
-            b.min[a] = -(float)ldexp(1.0, (int)(i % 100) - 50);
-            b.max[a] = -b.min[a];
-        }
-        return b;
-    default:
-        return absurd_box(seed);
-    }
-}
-
 static umb_scene *make_scene(uint64_t seed, int set, uint32_t count)
 {
     umb_scene *scene;
     assert_int_equal(umb_scene_create(NULL, &scene), UMB_OK);
     for (uint32_t i = 0; i < count; ++i) {
-        umb_object_def def = {.bounds = box_of_set(&seed, set, i)};
+        umb_object_def def = {.bounds = index_set_box(&seed, (index_set)set, i)};
         uint32_t id;
         assert_int_equal(umb_scene_add_object(scene, &def, &id), UMB_OK);
         assert_int_equal(id, i);
@@ -272,7 +63,7 @@ static void check_restored(umb_scene *scene, const umb_index_def *def, const umb
     }
     umb_stored_tree stored = {.refs = (const uint32_t(*)[UMB_NODE_WIDTH])refs, .node_count = t->node_count};
     assert_int_equal(umb_index_restore(scene, def, &stored, &again), UMB_OK);
-    check_index(again);
+    index_check(again);
     assert_memory_equal(umb_index_tree(again)->objects, t->objects, t->object_count * sizeof(t->objects[0]));
     umb_index_destroy(again);
     free(refs);
@@ -283,14 +74,14 @@ static const uint32_t counts[] = {0, 1, 2, 7, 8, 9, 10, 17, 64, 65, 1000, 9000};
 static void test_all_sets(void **state)
 {
     (void)state;
-    for (int set = 0; set < SET_COUNT; ++set) {
+    for (int set = 0; set < INDEX_SETS; ++set) {
         for (size_t i = 0; i < sizeof(counts) / sizeof(counts[0]); ++i) {
             umb_scene *scene = make_scene(31, set, counts[i]);
             for (int kind = 0; kind < 2; ++kind) {
                 umb_index_def def = {.kind = (umb_index_kind)kind};
                 umb_index *index;
                 assert_int_equal(umb_index_create(scene, &def, &index), UMB_OK);
-                check_index(index);
+                index_check(index);
                 check_restored(scene, &def, index);
                 assert_int_equal(umb_index_settings(index).kind, kind);
                 umb_index_destroy(index);
@@ -303,7 +94,7 @@ static void test_all_sets(void **state)
 static void test_flat_order(void **state)
 {
     (void)state;
-    umb_scene *scene = make_scene(32, SPREAD, 20);
+    umb_scene *scene = make_scene(32, INDEX_SPREAD, 20);
     assert_int_equal(umb_scene_remove_object(scene, 3), UMB_OK);
     assert_int_equal(umb_scene_commit(scene), UMB_OK);
     umb_index_def def = {.kind = UMB_INDEX_FLAT};
@@ -351,7 +142,7 @@ static void test_commits(void **state)
 {
     (void)state;
     uint64_t seed = 33;
-    umb_scene *scene = make_scene(34, SPREAD, 3000);
+    umb_scene *scene = make_scene(34, INDEX_SPREAD, 3000);
     umb_index *indices[2];
     for (int kind = 0; kind < 2; ++kind) {
         umb_index_def def = {.kind = (umb_index_kind)kind, .update = UMB_UPDATE_REFIT};
@@ -379,8 +170,8 @@ static void test_commits(void **state)
             assert_memory_equal(copy, before, count * sizeof(copy[0]));
             free(copy);
         }
-        check_index(indices[0]);
-        check_index(indices[1]);
+        index_check(indices[0]);
+        index_check(indices[1]);
     }
     assert_true(umb_scene_committed(scene)->first_free_occluder <
                 umb_scene_committed(scene)->occluder_count);
@@ -398,7 +189,7 @@ static void test_moves_in_a_large_tree(void **state)
     static const uint32_t moves[] = {1, 2, 30, 500, 9000, COUNT_LARGE};
     static const double origin[3] = {0, 0, 0};
     uint64_t seed = 36;
-    umb_scene *scene = make_scene(37, SPREAD, COUNT_LARGE);
+    umb_scene *scene = make_scene(37, INDEX_SPREAD, COUNT_LARGE);
     umb_index *index;
     umb_index_def def = {.update = UMB_UPDATE_REFIT};
     assert_int_equal(umb_index_create(scene, &def, &index), UMB_OK);
@@ -417,7 +208,7 @@ static void test_moves_in_a_large_tree(void **state)
         umb_bvh_refit(copy, tree->node_count, umb_scene_committed(scene));
         assert_memory_equal(copy, tree->nodes, tree->node_count * sizeof(copy[0]));
     }
-    check_index(index);
+    index_check(index);
     free(copy);
     umb_index_destroy(index);
     umb_scene_destroy(scene);
@@ -431,7 +222,7 @@ static umb_bvh_item *make_items(int set, uint32_t count)
     umb_bvh_item *items = malloc(count * sizeof(items[0]));
     assert_non_null(items);
     for (uint32_t i = 0; i < count; ++i) {
-        umb_aabb b = box_of_set(&seed, set, i);
+        umb_aabb b = index_set_box(&seed, (index_set)set, i);
         memset(&items[i], 0, sizeof(items[i]));
         memcpy(items[i].min, b.min, sizeof(b.min));
         memcpy(items[i].max, b.max, sizeof(b.max));
@@ -445,7 +236,7 @@ static void test_same_for_any_workers(void **state)
     (void)state;
     static const uint32_t workers[] = {0, 1, 2, 3, 8};
     umb_allocator a = umb_memory_allocator(NULL);
-    for (int set = 0; set < SET_COUNT; ++set) {
+    for (int set = 0; set < INDEX_SETS; ++set) {
         umb_node *first = NULL;
         uint32_t first_count = 0;
         for (int w = 0; w < 5; ++w) {
@@ -479,7 +270,7 @@ static void test_same_for_any_workers(void **state)
 static void test_quality(void **state)
 {
     (void)state;
-    umb_scene *scene = make_scene(36, SPREAD, 20000);
+    umb_scene *scene = make_scene(36, INDEX_SPREAD, 20000);
     umb_index *index;
     assert_int_equal(umb_index_create(scene, NULL, &index), UMB_OK);
     umb_index_stats stats;
@@ -520,7 +311,7 @@ static void test_failing_allocations(void **state)
     umb_scene *scene;
     assert_int_equal(umb_scene_create(&scene_def, &scene), UMB_OK);
     for (uint32_t i = 0; i < 5000; ++i) {
-        umb_object_def def = {.bounds = box_of_set(&seed, SPREAD, i)};
+        umb_object_def def = {.bounds = index_set_box(&seed, INDEX_SPREAD, i)};
         uint32_t id;
         assert_int_equal(umb_scene_add_object(scene, &def, &id), UMB_OK);
     }
@@ -539,7 +330,7 @@ static void test_failing_allocations(void **state)
         }
         m.left = -1;
         assert_true(limit > 2);
-        check_index(index);
+        index_check(index);
         umb_index_destroy(index);
         assert_true(m.bytes == held);
     }
@@ -559,10 +350,10 @@ static void test_failing_commit(void **state)
     uint32_t behind = 0;
     assert_int_equal(umb_scene_create(&scene_def, &scene), UMB_OK);
     assert_int_equal(umb_index_create(scene, NULL, &index), UMB_OK);
-    check_index(index);
+    index_check(index);
     for (int64_t limit = 0; limit < 60; ++limit) {
         for (uint32_t i = 0; i < 100; ++i) {
-            umb_object_def def = {.bounds = box_of_set(&seed, SPREAD, i)};
+            umb_object_def def = {.bounds = index_set_box(&seed, INDEX_SPREAD, i)};
             uint32_t id;
             assert_int_equal(umb_scene_add_object(scene, &def, &id), UMB_OK);
         }
@@ -574,7 +365,7 @@ static void test_failing_commit(void **state)
         assert_true(!stale || result == UMB_ERROR_MEMORY);
         behind += stale;
         assert_int_equal(umb_scene_commit(scene), UMB_OK);
-        check_index(index);
+        index_check(index);
     }
     assert_true(behind > 0);
     umb_index_destroy(index);
@@ -585,7 +376,7 @@ static void test_failing_commit(void **state)
 static void test_bad_kind(void **state)
 {
     (void)state;
-    umb_scene *scene = make_scene(38, SPREAD, 1);
+    umb_scene *scene = make_scene(38, INDEX_SPREAD, 1);
     umb_index_def def = {.kind = (umb_index_kind)17};
     umb_index *index = (umb_index *)scene;
     assert_int_equal(umb_index_create(scene, &def, &index), UMB_ERROR_ARGUMENT);
@@ -622,7 +413,7 @@ static void test_queries(void **state)
     (void)state;
     uint64_t seed = 39;
     enum { COUNT = 5000 };
-    umb_scene *scene = make_scene(40, SPREAD, COUNT);
+    umb_scene *scene = make_scene(40, INDEX_SPREAD, COUNT);
     umb_index *tree, *flat;
     umb_index_def def = {.kind = UMB_INDEX_FLAT};
     assert_int_equal(umb_index_create(scene, NULL, &tree), UMB_OK);

@@ -26,19 +26,11 @@ enum { MOST = 240, LEAST = 60, MOST_INDICES = 400, REACH = 40 };
 
 static uint32_t part, parts = 1;
 
-/* 's', 'n' or 'f'. */
-static char size_wanted(void)
-{
-    const char *size = getenv("UMBRAGE_TEST_SIZE");
-    return size != NULL && (size[0] == 's' || size[0] == 'f') ? size[0] : 'n';
-}
-
 /* A number set in the environment, or one for each size. */
 static uint32_t number_wanted(const char *variable, uint32_t small, uint32_t normal, uint32_t full)
 {
     const char *text = getenv(variable);
-    char size = size_wanted();
-    return text != NULL ? (uint32_t)strtoul(text, NULL, 10) : size == 's' ? small : size == 'n' ? normal : full;
+    return text != NULL ? (uint32_t)strtoul(text, NULL, 10) : for_size(small, normal, full);
 }
 
 /* One index, and two cullers over it. */
@@ -221,18 +213,9 @@ static void by_box(const umb_scene *scene, const umb_view *v, uint8_t found[MOST
         if (!c->objects[i].live) {
             continue;
         }
-        uint16_t left[8];
-        umb_node node = node_of(&c->objects[i].bounds, 1);
-        uint32_t outside =
-            umb_frustum_test_node(&f, umb_box_kernels_get(UMB_ISA_SCALAR), &node, f.all_planes, NULL, left);
-        found[i] = (outside & 1u) != 0 ? 0 : left[0] != 0 ? 1 : 2;
-        reference r[UMB_FRUSTUM_PLANES];
-        uint32_t planes = references(v, &c->objects[i].bounds, r);
-        bool touches = true;
-        for (uint32_t k = 0; k < planes; ++k) {
-            touches = touches && r[k].most >= 0x1p-58L * r[k].size;
-        }
-        assert_true(!touches || found[i] != 0);
+        bool sound;
+        found[i] = place_of_box(v, &f, &c->objects[i].bounds, &sound);
+        assert_true(sound);
     }
 }
 
@@ -410,7 +393,7 @@ static void test_edits(void **state)
     failing memory;
     umb_allocator allocator = failing_allocator(&memory, 1LL << 60);
     uint32_t wanted = number_wanted("UMBRAGE_EDITS", 1200, 10000, 10000), edits = 0, commits = 0, oracles = 0;
-    bool full = size_wanted() == 'f';
+    bool full = for_size(0, 0, 1) != 0;
     uint64_t inside = 0, hidden = 0;
     world_set_up(&w, 71, false, &allocator);
     for (; (full ? commits : edits) < wanted; ++commits) {

@@ -4,7 +4,8 @@
 
 #include <math.h>
 
-#include "frustum/frustum.h"
+#include "frustum/box_kernels.h"
+#include "random_boxes.h"
 
 /* g of each plane as view.h defines it, not normalised, at the box's corner farthest along the
  * normal (most) and at the opposite one (least), and a bound of what long double loses. */
@@ -54,6 +55,25 @@ static inline uint32_t references(const umb_view *v, const umb_aabb *b, referenc
         out[count++] = evaluate(n, v->planes[k][3], zero, b);
     }
     return count;
+}
+
+/* A box alone against the frustum, by the scalar kernel: 0 outside, 1 crossing, 2 inside. *sound: what touches the frustum in long
+ * double is not outside, and what is inside is inside there, too. */
+static inline uint8_t place_of_box(const umb_view *v, const umb_frustum *f, const umb_aabb *box, bool *sound)
+{
+    uint16_t left[UMB_NODE_WIDTH];
+    umb_node node = node_of(box, 1);
+    uint32_t outside = umb_frustum_test_node(f, umb_box_kernels_get(UMB_ISA_SCALAR), &node, f->all_planes, NULL, left);
+    uint8_t place = (outside & 1u) != 0 ? 0 : left[0] != 0 ? 1 : 2;
+    reference r[UMB_FRUSTUM_PLANES];
+    uint32_t planes = references(v, box, r);
+    bool touches = true, within = true;
+    for (uint32_t k = 0; k < planes; ++k) {
+        touches = touches && r[k].most >= 0x1p-58L * r[k].size;
+        within = within && r[k].least > -0x1p-58L * r[k].size;
+    }
+    *sound = (!touches || place != 0) && (place != 2 || within);
+    return place;
 }
 
 #endif

@@ -3,10 +3,19 @@
 #define RANDOM_BOXES_H
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "index/tree.h"
 #include "umbrage/view.h"
+
+/* UMBRAGE_TEST_SIZE: a number for each size. */
+static inline uint32_t for_size(uint32_t small, uint32_t normal, uint32_t full)
+{
+    const char *size = getenv("UMBRAGE_TEST_SIZE");
+    char first = size != NULL ? size[0] : 'n';
+    return first == 's' ? small : first == 'f' ? full : normal;
+}
 
 /* xorshift64*; never zero. */
 static inline uint64_t random_next(uint64_t *state)
