@@ -104,6 +104,28 @@ bool umb_memory_reserve(const umb_allocator *a, void **array, size_t *capacity, 
     return true;
 }
 
+/* New elements filled with a byte. */
+static bool fill_new(void *array, size_t known, size_t capacity, size_t size, int byte)
+{
+    if (capacity > known) {
+        memset((char *)array + known * size, byte, (capacity - known) * size);
+    }
+    return true;
+}
+
+bool umb_memory_reserve_zero(const umb_allocator *a, void **array, size_t *capacity, size_t need, size_t size)
+{
+    size_t known = *capacity;
+    return umb_memory_reserve(a, array, capacity, need, size) && fill_new(*array, known, *capacity, size, 0);
+}
+
+bool umb_memory_reserve_none(const umb_allocator *a, uint32_t **array, size_t *capacity, size_t need)
+{
+    size_t known = *capacity;
+    return umb_memory_reserve(a, (void **)array, capacity, need, sizeof **array) &&
+           fill_new(*array, known, *capacity, sizeof **array, 0xFF);
+}
+
 umb_result umb_error_set(umb_error *error, umb_result code, const char *format, ...)
 {
     if (error != NULL) {

@@ -17,6 +17,10 @@ void umb_memory_free(const umb_allocator *a, void *p, size_t bytes);
  * they were. */
 bool umb_memory_reserve(const umb_allocator *a, void **array, size_t *capacity, size_t need, size_t size);
 
+/* The same for arrays whose new elements are to be zero; and for numbers, new ones UMB_NONE. */
+bool umb_memory_reserve_zero(const umb_allocator *a, void **array, size_t *capacity, size_t need, size_t size);
+bool umb_memory_reserve_none(const umb_allocator *a, uint32_t **array, size_t *capacity, size_t need);
+
 /* Fill in an error, if there is one, and return code. */
 umb_result umb_error_set(umb_error *error, umb_result code, const char *format, ...)
     __attribute__((format(printf, 3, 4)));

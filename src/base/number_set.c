@@ -2,23 +2,12 @@
 
 #include <string.h>
 
-static bool grow(const umb_allocator *a, uint64_t **array, size_t *capacity, size_t need)
-{
-    size_t known = *capacity;
-    if (!umb_memory_reserve(a, (void **)array, capacity, need, sizeof **array)) {
-        return false;
-    }
-    if (*capacity > known) {
-        memset(*array + known, 0, (*capacity - known) * sizeof **array);
-    }
-    return true;
-}
-
 bool umb_number_set_reserve(umb_number_set *s, const umb_allocator *a, uint32_t limit)
 {
     size_t bits = ((size_t)limit + 63) / 64;
     /* Words for all the bits that there is room for. */
-    return grow(a, &s->bits, &s->bit_capacity, bits) && grow(a, &s->words, &s->word_capacity, s->bit_capacity / 64 + 1);
+    return umb_memory_reserve_zero(a, (void **)&s->bits, &s->bit_capacity, bits, sizeof *s->bits) &&
+           umb_memory_reserve_zero(a, (void **)&s->words, &s->word_capacity, s->bit_capacity / 64 + 1, sizeof *s->words);
 }
 
 void umb_number_set_free(umb_number_set *s, const umb_allocator *a)

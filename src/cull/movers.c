@@ -91,20 +91,14 @@ static void strip_exact(umb_movers *m, const umb_committed *scene)
 
 static bool reserve(umb_movers *m, const umb_allocator *a, const umb_committed *scene, bool occluders)
 {
-    size_t numbers = scene->motion.number_count, known = m->place_capacity, dated = m->shown_in_capacity;
+    size_t numbers = scene->motion.number_count;
     if (!umb_memory_reserve(a, (void **)&m->posed, &m->posed_capacity, numbers, sizeof *m->posed) ||
-        !umb_memory_reserve(a, (void **)&m->places, &m->place_capacity, numbers, sizeof *m->places) ||
+        !umb_memory_reserve_none(a, &m->places, &m->place_capacity, numbers) ||
         !umb_memory_reserve(a, (void **)&m->shown, &m->shown_capacity, numbers, sizeof *m->shown) ||
-        !umb_memory_reserve(a, (void **)&m->shown_in, &m->shown_in_capacity, numbers, sizeof *m->shown_in) ||
+        !umb_memory_reserve_zero(a, (void **)&m->shown_in, &m->shown_in_capacity, numbers, sizeof *m->shown_in) ||
         !umb_memory_reserve(a, (void **)&m->occluders, &m->occluder_capacity, occluders ? scene->occluder_count : 0,
                             sizeof *m->occluders)) {
         return false;
-    }
-    for (; known < m->place_capacity; ++known) {
-        m->places[known] = UMB_NONE;
-    }
-    for (; dated < m->shown_in_capacity; ++dated) {
-        m->shown_in[dated] = 0;
     }
     return true;
 }

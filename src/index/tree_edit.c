@@ -39,22 +39,10 @@ static void forget_places(uint32_t *places, size_t count)
     }
 }
 
-static bool grow_places(const umb_allocator *a, uint32_t **places, size_t *capacity, size_t need)
-{
-    size_t known = *capacity;
-    if (!umb_memory_reserve(a, (void **)places, capacity, need, sizeof **places)) {
-        return false;
-    }
-    for (; known < *capacity; ++known) {
-        (*places)[known] = UMB_NONE;
-    }
-    return true;
-}
-
 bool umb_tree_edit_reserve_places(umb_tree_edit *e, const umb_committed *scene)
 {
-    return grow_places(e->allocator, &e->places, &e->place_capacity, scene->object_count) &&
-           grow_places(e->allocator, &e->occluder_places, &e->occluder_capacity, scene->occluder_count);
+    return umb_memory_reserve_none(e->allocator, &e->places, &e->place_capacity, scene->object_count) &&
+           umb_memory_reserve_none(e->allocator, &e->occluder_places, &e->occluder_capacity, scene->occluder_count);
 }
 
 /* ---- nodes ---------------------------------------------------------------------------------- */

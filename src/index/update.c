@@ -210,15 +210,9 @@ bool umb_update_reserve(umb_updater *u, const umb_tree_edit *e)
     if (u->strategy != UMB_UPDATE_LAZY) {
         return true;
     }
-    size_t known = u->opened_capacity, need = e->node_capacity / 64 + 1;
-    if (!umb_memory_reserve(e->allocator, (void **)&u->opened, &u->opened_capacity, need, sizeof *u->opened) ||
-        !umb_number_set_reserve(&u->raised, e->allocator, (uint32_t)e->node_capacity)) {
-        return false;
-    }
-    if (u->opened_capacity > known) {
-        memset(u->opened + known, 0, (u->opened_capacity - known) * sizeof *u->opened);
-    }
-    return true;
+    return umb_memory_reserve_zero(e->allocator, (void **)&u->opened, &u->opened_capacity, e->node_capacity / 64 + 1,
+                                   sizeof *u->opened) &&
+           umb_number_set_reserve(&u->raised, e->allocator, (uint32_t)e->node_capacity);
 }
 
 size_t umb_update_memory(const umb_updater *u)

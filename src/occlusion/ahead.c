@@ -40,15 +40,12 @@ static bool reserve(umb_ahead *a, const umb_allocator *allocator, uint32_t helpe
 {
     size_t columns = (a->map->width + UMB_TILE_WIDTH - 1) / UMB_TILE_WIDTH;
     size_t rows = (a->map->height + UMB_TILE_HEIGHT - 1) / UMB_TILE_HEIGHT;
-    size_t tiles = LAYERS * columns * rows, known = a->place_capacity;
+    size_t tiles = LAYERS * columns * rows;
     if (!umb_memory_reserve(allocator, (void **)&a->images, &a->image_capacity, MOST_IMAGES, sizeof *a->images) ||
         !umb_memory_reserve(allocator, (void **)&a->noted, &a->noted_capacity, MOST_IMAGES, sizeof *a->noted) ||
-        !umb_memory_reserve(allocator, (void **)&a->place, &a->place_capacity, a->scene->occluder_count,
-                            sizeof *a->place)) {
+        !umb_memory_reserve_zero(allocator, (void **)&a->place, &a->place_capacity, a->scene->occluder_count,
+                                 sizeof *a->place)) {
         return false;
-    }
-    for (; known < a->place_capacity; ++known) {
-        a->place[known] = 0;
     }
     for (uint32_t i = 0; i < helpers; ++i) {
         umb_ahead_helper *h = &a->helpers[i];

@@ -4,13 +4,8 @@
 
 bool umb_expiries_reserve(umb_expiries *e, const umb_allocator *a, uint32_t count)
 {
-    size_t known = e->place_capacity;
-    bool ok = umb_memory_reserve(a, (void **)&e->heap, &e->heap_capacity, count, sizeof *e->heap) &&
-              umb_memory_reserve(a, (void **)&e->places, &e->place_capacity, count, sizeof *e->places);
-    for (; known < e->place_capacity; ++known) {
-        e->places[known] = UMB_NONE;
-    }
-    return ok;
+    return umb_memory_reserve(a, (void **)&e->heap, &e->heap_capacity, count, sizeof *e->heap) &&
+           umb_memory_reserve_none(a, &e->places, &e->place_capacity, count);
 }
 
 void umb_expiries_free(umb_expiries *e, const umb_allocator *a)

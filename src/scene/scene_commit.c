@@ -85,27 +85,22 @@ static uint64_t count_new_occluders(const umb_scene *scene)
 static bool reserve(umb_scene *scene, size_t occluders)
 {
     const umb_allocator *a = &scene->allocator;
-    size_t objects = scene->object_ids.used, known = scene->source_capacity;
-    bool ready =
-        umb_memory_reserve(a, (void **)&scene->committed_objects, &scene->committed_object_capacity, objects,
-                           sizeof *scene->committed_objects) &&
-        umb_memory_reserve(a, (void **)&scene->committed_occluders, &scene->committed_occluder_capacity, occluders,
-                           sizeof *scene->committed_occluders) &&
-        umb_memory_reserve(a, (void **)&scene->committed_masks, &scene->committed_mask_capacity, occluders,
-                           sizeof *scene->committed_masks) &&
-        umb_memory_reserve(a, (void **)&scene->sources, &scene->source_capacity, occluders, sizeof *scene->sources) &&
-        umb_memory_reserve(a, (void **)&scene->committed_replaced, &scene->committed_replaced_capacity, occluders,
-                           sizeof *scene->committed_replaced) &&
-        umb_memory_reserve(a, (void **)&scene->committed_moved, &scene->committed_moved_capacity, objects,
-                           sizeof *scene->committed_moved) &&
-        umb_memory_reserve(a, (void **)&scene->committed_came, &scene->committed_came_capacity, scene->touched_count,
-                           sizeof *scene->committed_came) &&
-        umb_memory_reserve(a, (void **)&scene->committed_went, &scene->committed_went_capacity, scene->touched_count,
-                           sizeof *scene->committed_went);
-    for (; known < scene->source_capacity; ++known) {
-        scene->sources[known].replaced = false;
-    }
-    return ready;
+    size_t objects = scene->object_ids.used;
+    return umb_memory_reserve(a, (void **)&scene->committed_objects, &scene->committed_object_capacity, objects,
+                              sizeof *scene->committed_objects) &&
+           umb_memory_reserve(a, (void **)&scene->committed_occluders, &scene->committed_occluder_capacity, occluders,
+                              sizeof *scene->committed_occluders) &&
+           umb_memory_reserve(a, (void **)&scene->committed_masks, &scene->committed_mask_capacity, occluders,
+                              sizeof *scene->committed_masks) &&
+           umb_memory_reserve_zero(a, (void **)&scene->sources, &scene->source_capacity, occluders, sizeof *scene->sources) &&
+           umb_memory_reserve(a, (void **)&scene->committed_replaced, &scene->committed_replaced_capacity, occluders,
+                              sizeof *scene->committed_replaced) &&
+           umb_memory_reserve(a, (void **)&scene->committed_moved, &scene->committed_moved_capacity, objects,
+                              sizeof *scene->committed_moved) &&
+           umb_memory_reserve(a, (void **)&scene->committed_came, &scene->committed_came_capacity, scene->touched_count,
+                              sizeof *scene->committed_came) &&
+           umb_memory_reserve(a, (void **)&scene->committed_went, &scene->committed_went_capacity, scene->touched_count,
+                              sizeof *scene->committed_went);
 }
 
 /* Where readers find the arrays. */
