@@ -30,18 +30,25 @@ static const bench_scene SCENES[] = {
     {"e1m1", "quake/e1m1.bsp", "quake/e1m1.path.csv", 4.0},
 };
 
-static const umb_method METHODS[] = {UMB_METHOD_PLANES, UMB_METHOD_SHADOW_FRUSTA, UMB_METHOD_OCCLUSION_TREE};
+static const struct way {
+    const char *name;
+    umb_method method;
+    uint32_t coherence;
+} WAYS[] = {{"planes", UMB_METHOD_PLANES, 0},
+            {"planes, leaves", UMB_METHOD_PLANES, UMB_COHERENCE_LEAVES},
+            {"shadow-frusta", UMB_METHOD_SHADOW_FRUSTA, 0},
+            {"occlusion-tree", UMB_METHOD_OCCLUSION_TREE, 0}};
 static const uint32_t BUDGETS[] = {8, 16, 32, 64, 128, 256};
 
 enum {
     VIEWS = 24,
-    METHOD_COUNT = sizeof METHODS / sizeof METHODS[0],
+    WAY_COUNT = sizeof WAYS / sizeof WAYS[0],
     BUDGET_COUNT = sizeof BUDGETS / sizeof BUDGETS[0],
-    ROWS = 1 + METHOD_COUNT * BUDGET_COUNT /* the raster first */
+    ROWS = 1 + WAY_COUNT * BUDGET_COUNT /* the raster first */
 };
 
 typedef struct row {
-    umb_method method;
+    const char *name;
     uint32_t budget;
     umb_culler *culler;
     double ms[VIEWS]; /* least so far */
@@ -153,13 +160,15 @@ static bool run(stand *s, uint32_t rounds)
 
 static bool make_rows(stand *s)
 {
+    static const struct way raster = {"raster", UMB_METHOD_RASTER, 0};
     bool ok = true;
     for (uint32_t k = 0; k < ROWS && ok; ++k) {
         row *r = &s->rows[k];
-        r->method = k == 0 ? UMB_METHOD_RASTER : METHODS[(k - 1) / BUDGET_COUNT];
+        const struct way *way = k == 0 ? &raster : &WAYS[(k - 1) / BUDGET_COUNT];
+        r->name = way->name;
         r->budget = k == 0 ? 0 : BUDGETS[(k - 1) % BUDGET_COUNT];
-        umb_culler_def def = {.method = r->method, .occluder_budget = r->budget};
-        ok = umb_culler_create(s->index, &def, &r->culler) == UMB_OK;
+        umb_culler_def def = {.method = way->method, .coherence = way->coherence, .occluder_budget = r->budget};
+        ok = umb_culler_create(s->index, &def, &r->culler) == UMB_OK && umb_culler_prepare(r->culler) == UMB_OK;
     }
     return ok;
 }
@@ -184,7 +193,7 @@ static bool print_rows(const stand *s)
             (void)snprintf(budget, sizeof budget, "%u", r->budget);
         }
         printf("| %s | %s | %s | %.1f | %.1f | %.3f | %.3f | %.1f | %.1f | %.0f |\n", s->scene->name,
-               umb_method_name(r->method), budget, (double)r->reported / n, (double)s->truly_visible / n,
+               r->name, budget, (double)r->reported / n, (double)s->truly_visible / n,
                (double)r->reported / (double)s->truly_visible, mean_ms(s, r), mean_ms(s, r) / raster,
                r->sum.occluders / n, r->sum.queries / n);
         wrong += r->wrong;

@@ -23,6 +23,7 @@ static const struct way {
 } WAYS[] = {{"raster", UMB_METHOD_RASTER, 0},
             {"planes", UMB_METHOD_PLANES, 0},
             {"planes, kept", UMB_METHOD_PLANES, UMB_COHERENCE_PLANES},
+            {"planes, leaves", UMB_METHOD_PLANES, UMB_COHERENCE_LEAVES},
             {"shadow frusta", UMB_METHOD_SHADOW_FRUSTA, 0},
             {"occlusion tree", UMB_METHOD_OCCLUSION_TREE, 0}};
 
@@ -52,6 +53,7 @@ static void ask(const umb_index *index, const struct way *way, const micro_scene
     umb_view near_by = micro->view;
     near_by.eye[0] += 0.25;
     assert_int_equal(umb_culler_create(index, &def, &out->culler), UMB_OK);
+    assert_int_equal(umb_culler_prepare(out->culler), UMB_OK);
     if (way->coherence != 0) { /* a frame to remember */
         assert_int_equal(umb_cull(out->culler, &near_by, &seen), UMB_OK);
     }

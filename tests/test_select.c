@@ -1,5 +1,6 @@
 /* Choosing occluders: a selector that follows a scene from commit to commit chooses what a new one does, over any index,
- * after any edits; and commits that it did not see are no harm. */
+ * after any edits; and commits that it did not see are no harm. Lists of leaves are what looking at every occluder from every
+ * point gives, and name nothing that is not there. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -10,9 +11,10 @@
 
 #include <cmocka.h>
 
-#include "occlusion/select.h"
+#include "occlusion/chooser.h"
 #include "support/failing.h"
 #include "support/random_boxes.h"
+#include "umbrage/umbrage.h"
 
 enum { SHAPES = 3, OBJECTS = 120, SIDE = 3 };
 
@@ -101,6 +103,7 @@ static uint32_t compare(umb_selector *old, const umb_choice *choice)
     umb_pick p, q;
     uint32_t count = 0;
     umb_selector_create(&fresh, &a);
+    assert_true(umb_select_follow(old, choice) && umb_select_follow(&fresh, choice));
     assert_int_equal(umb_select_begin(old, choice, kernels), UMB_OK);
     assert_int_equal(umb_select_begin(&fresh, choice, kernels), UMB_OK);
     for (uint32_t i = 0; i < choice->scene->occluder_count; ++i) {
@@ -166,7 +169,7 @@ static void test_follows(void **state)
 {
     (void)state;
     uint64_t chosen = 0, seed = 1;
-    for (int round = 0; round < rounds(40); ++round) {
+    for (int round = 0; round < rounds(20); ++round) {
         for (uint32_t k = 0; umb_index_variant(k) != NULL; ++k, ++seed) {
             umb_index_update update = (umb_index_update)(seed % 8);
             follow(seed, umb_index_variant(k), k < 2 ? update : UMB_UPDATE_DEFAULT, &chosen);
@@ -176,8 +179,222 @@ static void test_follows(void **state)
     assert_true(chosen > 0);
 }
 
+/* ---- lists of leaves ---------------------------------------------------------------------------- */
+
+/* A scene after some edits, and who chooses in it. */
+typedef struct stand {
+    umb_scene *scene;
+    umb_index *index;
+    umb_shape shapes[SHAPES];
+    umb_chooser chooser;
+    dice d;
+} stand;
+
+static void open_stand(stand *s, uint64_t seed)
+{
+    umb_allocator a = umb_memory_allocator(NULL);
+    s->d = (dice){seed};
+    assert_int_equal(umb_scene_create(NULL, &s->scene), UMB_OK);
+    add_shapes(s->scene, s->shapes);
+    for (int i = 0; i < 150; ++i) {
+        edit(s->scene, &s->d, s->shapes);
+    }
+    assert_int_equal(umb_scene_commit(s->scene), UMB_OK);
+    assert_int_equal(umb_index_create(s->scene, NULL, &s->index), UMB_OK);
+    umb_chooser_create(&s->chooser, &a);
+}
+
+static void close_stand(stand *s)
+{
+    umb_chooser_free(&s->chooser);
+    umb_index_destroy(s->index);
+    umb_scene_destroy(s->scene);
+}
+
+/* The paper's measure of a pick from a point: what it shows along a direction, over the square of its distance. What is
+ * right abreast, or edge-on, counts or not. */
+static double shown(const umb_pick *pick, const double eye[3], const double direction[3], bool back, bool counts)
+{
+    bool body = pick->facet == UMB_NONE;
+    uint32_t first = body ? 0 : pick->facet, end = body ? pick->facets->facet_count : pick->facet + 1, corners = 0;
+    double centre[3] = {0, 0, 0}, sum = 0.0, areas = 0.0, square = 0.0, ahead = 0.0, facing = 0.0, last[3] = {0, 0, 0};
+    for (uint32_t i = first; i < end; ++i) {
+        const umb_facet *f = &pick->facets->facets[i];
+        double area[3] = {0, 0, 0}, world[UMB_FACET_CORNERS][3], along = 0.0;
+        for (uint32_t k = 0; k < f->count; ++k, ++corners) {
+            const float *p = pick->facets->positions[pick->facets->corners[f->first + k]];
+            for (int x = 0; x < 3; ++x) {
+                const float *row = pick->place->transform.m[x];
+                world[k][x] = pick->place->identity ? p[x] : (double)row[0] * p[0] + (double)row[1] * p[1] + (double)row[2] * p[2] + row[3];
+                centre[x] += world[k][x];
+            }
+        }
+        for (uint32_t k = 0; k < f->count; ++k) {
+            const double *p = world[k], *q = world[(k + 1) % f->count];
+            for (int x = 0; x < 3; ++x) {
+                area[x] += 0.5 * (p[(x + 1) % 3] * q[(x + 2) % 3] - p[(x + 2) % 3] * q[(x + 1) % 3]);
+            }
+        }
+        for (int x = 0; x < 3; ++x) {
+            along += area[x] * direction[x] * (pick->place->mirrored ? -1.0 : 1.0);
+        }
+        areas += sqrt(area[0] * area[0] + area[1] * area[1] + area[2] * area[2]);
+        memcpy(last, area, sizeof last);
+        sum += f->two_sided ? fabs(along) : fmax(0.0, back ? along : -along);
+    }
+    for (int x = 0; x < 3; ++x) {
+        double off = centre[x] / corners - eye[x];
+        square += off * off;
+        ahead += off * direction[x];
+        facing += off * last[x];
+    }
+    bool edge_on = !body && fabs(facing) <= 1e-5 * areas * sqrt(square) && !counts; /* nothing is seen of it from there */
+    double least = counts ? -1e-5 : 1e-5, near = counts ? 1.0 + 1e-5 : 1.0 - 1e-5;
+    return !edge_on && (ahead > least * sqrt(square) || square <= near * areas) ? sum / square : 0.0;
+}
+
+static void check_list(stand *s, uint32_t leaf, umb_leaf_side side, const double direction[3], uint64_t *entries)
+{
+    const umb_committed *scene = umb_scene_committed(s->scene);
+    uint32_t count, found = 0;
+    const umb_leaf_entry *list = umb_leaf_lists_get(&s->chooser.lists, leaf, side, direction, &count);
+    const umb_aabb *cell = &s->chooser.lists.leaves[leaf].cell;
+    for (uint32_t i = 0; i < count; ++i) {
+        assert_true(list[i].occluder < scene->occluder_count && (i == 0 || list[i].score <= list[i - 1].score));
+        umb_pick pick = umb_chooser_pick(&s->chooser, &list[i]);
+        assert_true(list[i].facet == UMB_NONE ? umb_occluder_is_body(&s->chooser.selector.known, scene, list[i].occluder)
+                                              : list[i].facet < pick.facets->facet_count);
+        double most = 0.0, least = 0.0;
+        for (uint32_t point = 0; point < UMB_LEAF_POINTS; ++point) {
+            double eye[3];
+            for (int x = 0; x < 3; ++x) {
+                double part = point == 0 ? 0.5 : (point - 1) >> x & 1 ? 0.75 : 0.25;
+                eye[x] = cell->min[x] + part * ((double)cell->max[x] - cell->min[x]);
+            }
+            most = fmax(most, shown(&pick, eye, direction, side == UMB_LEAF_BACK, true));
+            least = fmax(least, shown(&pick, eye, direction, side == UMB_LEAF_BACK, false));
+        }
+        assert_true(list[i].score >= (1.0 - 1e-4) * least && list[i].score <= (1.0 + 1e-4) * most);
+        found += 1;
+    }
+    *entries += found;
+}
+
+/* Every list of every leaf, right after its leaf looked about and after edits. */
+static void test_leaves(void **state)
+{
+    (void)state;
+    uint64_t entries = 0;
+    for (int round = 0; round < rounds(20); ++round) {
+        stand s;
+        open_stand(&s, (uint64_t)round + 500);
+        umb_cull_stats stats = {0};
+        for (int frame = 0; frame < 4; ++frame) {
+            umb_choice choice = {.scene = umb_scene_committed(s.scene), .tree = umb_index_tree(s.index),
+                                 .coherence = UMB_COHERENCE_LEAVES, .stats = &stats};
+            assert_int_equal(umb_chooser_prepare(&s.chooser, &choice, umb_box_kernels_get(UMB_ISA_SCALAR), 64), UMB_OK);
+            s.chooser.choice = &choice;
+            for (uint32_t leaf = 0; leaf < 1u << s.chooser.lists.depth; ++leaf) {
+                static const double directions[3][3] = {{0, 0, -1}, {0.5773502691896258, 0.5773502691896258, -0.5773502691896258}, {1, 0, 0}};
+                assert_int_equal(s.chooser.lists.leaves[leaf].points, UMB_LEAF_POINTS);
+                for (int k = 0; k < 3 && frame == 0; ++k) {
+                    check_list(&s, leaf, UMB_LEAF_FRONT, directions[k], &entries);
+                    check_list(&s, leaf, UMB_LEAF_BACK, directions[k], &entries);
+                }
+            }
+            for (uint32_t n = 1 + dice_roll(&s.d, 20); n > 0; --n) {
+                edit(s.scene, &s.d, s.shapes);
+            }
+            assert_int_equal(umb_scene_commit(s.scene), UMB_OK);
+        }
+        close_stand(&s);
+    }
+    printf("# entries of lists: %llu\n", (unsigned long long)entries);
+    assert_true(entries > 0);
+}
+
+/* A viewer walks while the scene changes: entries always name what is there, and answers are safe by what hides them. */
+static void test_walk(void **state)
+{
+    (void)state;
+    static const umb_method methods[3] = {UMB_METHOD_PLANES, UMB_METHOD_SHADOW_FRUSTA, UMB_METHOD_OCCLUSION_TREE};
+    uint64_t reported = 0, random = 9;
+    for (int round = 0; round < rounds(30); ++round) {
+        stand s;
+        open_stand(&s, (uint64_t)round + 900);
+        umb_culler *cullers[3];
+        for (int m = 0; m < 3; ++m) {
+            umb_culler_def def = {.method = methods[m], .coherence = UMB_COHERENCE_LEAVES | UMB_COHERENCE_REST, .occluder_budget = 20};
+            assert_int_equal(umb_culler_create(s.index, &def, &cullers[m]), UMB_OK);
+        }
+        for (int frame = 0; frame < 40; ++frame) {
+            umb_view view = random_view(&random, 15.0);
+            umb_visible_set seen;
+            for (int m = 0; m < 3; ++m) {
+                assert_int_equal(umb_cull(cullers[m], &view, &seen), UMB_OK);
+                reported += seen.count;
+            }
+            for (uint32_t n = dice_roll(&s.d, 6); n > 0; --n) {
+                edit(s.scene, &s.d, s.shapes);
+            }
+            assert_int_equal(umb_scene_commit(s.scene), UMB_OK);
+        }
+        for (int m = 0; m < 3; ++m) {
+            umb_culler_destroy(cullers[m]);
+        }
+        close_stand(&s);
+    }
+    assert_true(reported > 0);
+}
+
+/* Without memory a call says so, and the next one is right; once all is made ahead, frames take none. */
+static void test_memory(void **state)
+{
+    (void)state;
+    failing f;
+    umb_scene_def scene_def = {.allocator = failing_allocator(&f, 1 << 30)};
+    umb_scene *scene;
+    umb_index *index;
+    umb_shape shapes[SHAPES];
+    dice d = {77};
+    assert_int_equal(umb_scene_create(&scene_def, &scene), UMB_OK);
+    add_shapes(scene, shapes);
+    for (int i = 0; i < 90; ++i) {
+        edit(scene, &d, shapes);
+    }
+    assert_int_equal(umb_scene_commit(scene), UMB_OK);
+    assert_int_equal(umb_index_create(scene, NULL, &index), UMB_OK);
+    long long held = atomic_load(&f.held);
+    uint64_t random = 3;
+    umb_view view = random_view(&random, 10.0);
+    bool done = false;
+    for (long long limit = 0; !done; ++limit) {
+        umb_culler_def def = {.method = UMB_METHOD_PLANES, .coherence = UMB_COHERENCE_LEAVES};
+        umb_culler *culler = NULL;
+        umb_visible_set seen;
+        atomic_store(&f.left, limit);
+        if (umb_culler_create(index, &def, &culler) == UMB_OK) {
+            umb_result result = umb_culler_prepare(culler);
+            assert_true(result == UMB_OK || result == UMB_ERROR_MEMORY);
+            result = result == UMB_OK ? umb_cull(culler, &view, &seen) : result;
+            assert_true(result == UMB_OK || result == UMB_ERROR_MEMORY);
+            done = result == UMB_OK;
+            atomic_store(&f.left, 1 << 30);
+            assert_int_equal(umb_culler_prepare(culler), UMB_OK);
+            assert_int_equal(umb_cull(culler, &view, &seen), UMB_OK);
+            atomic_store(&f.left, 0);
+            assert_int_equal(umb_cull(culler, &view, &seen), UMB_OK);
+        }
+        umb_culler_destroy(culler);
+        assert_true(atomic_load(&f.held) == held);
+    }
+    umb_index_destroy(index);
+    umb_scene_destroy(scene);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_follows)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_follows), cmocka_unit_test(test_leaves),
+                                       cmocka_unit_test(test_walk), cmocka_unit_test(test_memory)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

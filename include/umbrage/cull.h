@@ -51,14 +51,21 @@ typedef enum umb_coherence {
        image stays much where and what it was; convex ones, which are cheap, do not. May report more.
        UMB_METHOD_PLANES and UMB_METHOD_SHADOW_FRUSTA: one that was chosen and hid nothing, convex or not, makes room
        for others as long. Methods that choose their occluders first know no other switch but
-       the next one, and UMB_COHERENCE_LIST with UMB_METHOD_SHADOW_FRUSTA: those that hid most in the last frame are
+       the next two, and UMB_COHERENCE_LIST with UMB_METHOD_SHADOW_FRUSTA: those that hid most in the last frame are
        chosen first. */
     UMB_COHERENCE_REST = 1u << 4,
     /* UMB_METHOD_PLANES: tangent planes of occluders' edges and boxes are kept at the nodes, 19 MB of them, and used
        again when the eye has moved (Coorg and Teller 3.3); without, planes through the eye are made in each frame,
        which costs less (docs/results/planes.md). Answers are the same. */
     UMB_COHERENCE_PLANES = 1u << 5,
-    UMB_COHERENCE_ALL = (1u << 6) - 1
+    /* Methods that choose first, in perspective and within the scene's bounds: a kd-tree divides the places of viewers, each of
+       its leaves keeps lists of the occluders that look largest from there in 26 directions, and a frame takes its
+       occluders from one list instead of searching for them (Coorg and Teller 4; docs/results/planes.md). A
+       leaf looks about from one more of its nine points in each frame that a viewer is in it, or from all with
+       umb_culler_prepare; it looks again when something large has come near. UMB_METHOD_PLANES: objects that are left are held
+       against what may hide them where they stand, too (5, detail objects). May report more or fewer. */
+    UMB_COHERENCE_LEAVES = 1u << 6,
+    UMB_COHERENCE_ALL = (1u << 7) - 1
 } umb_coherence;
 
 typedef struct umb_culler_def {
@@ -80,7 +87,7 @@ typedef struct umb_culler_def {
     /* Draw at most so many occluders in a frame, those with the best score: the area of the image of their box,
        times how often their drawing changed anything of late. What score it takes is learned from frame to frame;
        the first frame draws the nearest. 0: no limit. Methods that choose first take so many for each
-       frame: UMB_METHOD_PLANES by how large they look, 0: 64, at most 65534; UMB_METHOD_SHADOW_FRUSTA by what they hide of
+       frame: UMB_METHOD_PLANES by how large they look, 0: 64, at most 65000; UMB_METHOD_SHADOW_FRUSTA by what they hide of
        objects sampled in view, 0: 64, at most 16384; UMB_METHOD_OCCLUSION_TREE by how large they look where no other
        hides them, 0: 128, at most 512. */
     uint32_t occluder_budget;
@@ -133,6 +140,12 @@ typedef struct umb_visible_set {
 UMB_API umb_result umb_culler_create(const umb_index *index, const umb_culler_def *def, umb_culler **out);
 /* NULL is allowed. */
 UMB_API void umb_culler_destroy(umb_culler *culler);
+
+/* Do now, for the scene as committed, what is done once and not in each frame, by this call or by the first frames: facets
+ * of occluders, and with UMB_COHERENCE_LEAVES all lists, which takes some milliseconds for each of up to 256 leaves. Errors:
+ * UMB_ERROR_STATE as umb_cull; no memory. Nothing is answered differently without UMB_COHERENCE_LEAVES. Threads: as
+ * umb_cull. */
+UMB_API umb_result umb_culler_prepare(umb_culler *culler);
 
 /* From now on report only candidates: objects whose bit is set, bit i % 32 of word i / 32 for object i; those from object_count
  * on are none. A set that is potentially visible, say, or what a query is about. Copied. bits NULL: all objects, as in the

@@ -120,7 +120,7 @@ umb_result umb_culler_create(const umb_index *index, const umb_culler_def *def, 
     c->kernels = kernels;
     c->ops = umb_method_get(def->method);
     if (c->ops != NULL && !chooses(c)) { /* without occlusion there is nothing to learn */
-        c->past.switches = def->coherence & ~(uint32_t)UMB_COHERENCE_PLANES;
+        c->past.switches = def->coherence & ~(uint32_t)(UMB_COHERENCE_PLANES | UMB_COHERENCE_LEAVES);
         c->past.budget = def->occluder_budget;
     }
     if (c->ops != NULL && c->ops->create(allocator, def->isa, &c->method) != UMB_OK) {
@@ -946,6 +946,24 @@ static void finish(walk *w)
     }
     w->stats.visible = c->count;
     w->stats.hidden_movers = w->scene->motion.count > 0 ? umb_movers_hidden(&c->movers) : 0;
+}
+
+umb_result umb_culler_prepare(umb_culler *c)
+{
+    const umb_tree *tree = umb_index_tree(c->index);
+    const umb_committed *scene = umb_scene_committed(umb_index_scene(c->index));
+    umb_cull_stats stats;
+    umb_choice choice = {.scene = scene, .tree = tree, .budget = c->def.occluder_budget, .coherence = c->def.coherence,
+                         .stats = &stats};
+    if (!chooses(c)) {
+        return UMB_OK;
+    }
+    if (tree->version != scene->version) {
+        return umb_error_set(c->def.error, UMB_ERROR_STATE, "the index found no memory at the last commit: commit again");
+    }
+    return c->ops->make_ahead(c->method, &choice) == UMB_OK
+               ? UMB_OK
+               : umb_error_set(c->def.error, UMB_ERROR_MEMORY, "no memory for what is made ahead of frames");
 }
 
 umb_result umb_cull(umb_culler *c, const umb_view *view, umb_visible_set *out)

@@ -17,6 +17,7 @@
  *   ask            about a node's boxes, with the token that the answer about the node gave; answers hand
  *                  a token to each child: what is left to ask below it
  *   hides_object   about one object in more detail than its box
+ *   make_ahead     what is made once for many frames
  *
  * That something is hidden is a promise; anything else is none.
  */
@@ -89,6 +90,9 @@ typedef struct umb_method_ops {
     void (*ask)(void *state, umb_query *query);
     /* True if the object, whose box is not hidden, is. token: that of its box. Optional. */
     bool (*hides_object)(void *state, uint32_t object, uint32_t token);
+    /* Make ahead what choose() would make for frames to come; of the choice the view and what belongs to it is not
+       looked at. */
+    umb_result (*make_ahead)(void *state, const umb_choice *choice);
 
     /* ---- methods that take occluders as they come ---- */
     umb_result (*prepare)(void *state, const umb_raster_map *map, const umb_committed *scene);

@@ -142,6 +142,7 @@ static bool make_soup(umb_occluder_sets *s, const umb_committed *scene)
         s->soup.two_sided = s->soup_sides;
     }
     umb_scratch_free(&scratch);
+    s->welds += 1;
     umb_facets_free(&s->sets[UMB_SET_WELDED].facets, &s->allocator);
     return ok && umb_facets_build(&s->sets[UMB_SET_WELDED].facets, &s->allocator, &s->soup);
 }
@@ -278,7 +279,7 @@ static float area_scale(const umb_occluder *o)
 
 bool umb_occluder_is_body(const umb_occluder_sets *s, const umb_committed *scene, uint32_t occluder)
 {
-    return scene->occluders[occluder].mesh->convex && s->sets[s->set_of[occluder]].facets.facet_count <= 16;
+    return scene->occluders[occluder].mesh->convex && s->sets[s->set_of[occluder]].facets.facet_count <= UMB_BODY_FACETS;
 }
 
 static float area_of(const umb_occluder_sets *s, const umb_committed *scene, uint32_t occluder)

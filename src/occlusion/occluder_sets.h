@@ -29,6 +29,7 @@ typedef struct umb_occluder_sets {
     uint32_t *soup_tags;
     uint8_t *soup_sides;
     uint32_t soup_positions, soup_users;
+    uint64_t welds;        /* how often the welded set was made: its facets have other numbers since */
     uint32_t *soup_first;  /* per occluder: its first facet in the welded set; the end is the next one's */
     float *areas;          /* per occluder: at least the area that it can show */
     float *node_areas;     /* per node and block: at least the largest below it */
@@ -40,6 +41,9 @@ typedef struct umb_occluder_sets {
 } umb_occluder_sets;
 
 #define UMB_SET_WELDED 0u
+
+/* Bodies of more facets are not asked about as a whole. */
+enum { UMB_BODY_FACETS = 16 };
 
 void umb_occluder_sets_create(umb_occluder_sets *s, const umb_allocator *a);
 void umb_occluder_sets_free(umb_occluder_sets *s);

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "chooser.h"
 #include "fronts.h"
 #include "occlusion_tree.h"
 #include "shape_hull.h"
@@ -19,7 +20,7 @@
 typedef struct method {
     umb_allocator allocator;
     const umb_box_kernels *kernels;
-    umb_selector selector;
+    umb_chooser chooser;
     umb_shadows shadows;
     umb_occlusion_tree tree;
     umb_front_room room;
@@ -34,7 +35,7 @@ static umb_result create(const umb_allocator *allocator, umb_isa isa, void **sta
     }
     m->allocator = *allocator;
     m->kernels = umb_box_kernels_get(isa);
-    umb_selector_create(&m->selector, allocator);
+    umb_chooser_create(&m->chooser, allocator);
     *state = m;
     return UMB_OK;
 }
@@ -43,7 +44,7 @@ static void destroy(void *state)
 {
     method *m = state;
     umb_allocator a = m->allocator;
-    umb_selector_free(&m->selector);
+    umb_chooser_free(&m->chooser);
     umb_shadows_free(&m->shadows, &a);
     umb_occlusion_tree_free(&m->tree, &a);
     umb_memory_free(&a, m, sizeof *m);
@@ -72,21 +73,32 @@ static bool insert(method *m, const umb_pick *pick)
     return m->tree.planted != before;
 }
 
+static uint32_t budget_of(const umb_choice *choice)
+{
+    uint32_t budget = choice->budget != 0 ? choice->budget : OCCLUDERS;
+    return budget < MOST ? budget : MOST;
+}
+
+static umb_result make_ahead(void *state, const umb_choice *choice)
+{
+    method *m = state;
+    return umb_chooser_prepare(&m->chooser, choice, m->kernels, TRIES * budget_of(choice));
+}
+
 static umb_result choose(void *state, const umb_choice *choice)
 {
     method *m = state;
-    uint32_t budget = choice->budget != 0 ? choice->budget : OCCLUDERS, taken = 0;
-    budget = budget < MOST ? budget : MOST;
+    uint32_t budget = budget_of(choice), taken = 0;
     m->choice = choice;
     umb_pick pick;
-    if (!reserve(m, budget) || umb_select_begin(&m->selector, choice, m->kernels) != UMB_OK) {
+    if (!reserve(m, budget) || umb_chooser_begin(&m->chooser, choice, m->kernels, TRIES * budget) != UMB_OK) {
         return UMB_ERROR_MEMORY;
     }
     umb_shadow_viewer_prepare(&m->shadows.viewer, choice->view, umb_select_reach(choice));
     umb_shadows_clear(&m->shadows);
     umb_occlusion_tree_begin(&m->tree, &m->shadows, true);
     for (uint32_t tries = 0; tries < TRIES * budget && taken < budget; ++tries) {
-        if (!umb_select_next(&m->selector, &pick)) {
+        if (!umb_chooser_next(&m->chooser, &pick)) {
             break;
         }
         taken += insert(m, &pick);
@@ -161,6 +173,7 @@ const umb_method_ops umb_occlusion_tree_method = {
     .create = create,
     .destroy = destroy,
     .choose = choose,
+    .make_ahead = make_ahead,
     .ask = ask,
     .hides_object = hides_object,
 };

@@ -10,14 +10,17 @@
 
 #include <string.h>
 
+#include "near_blockers.h"
 #include "planes_cache.h"
-#include "select.h"
 
 #define CHOSEN 64
+#define MOST 65000u
 /* Lists of the nodes that wait: as deep as trees are, eight boxes each. */
 #define LEVELS 48
 /* Occluders that hide a box together. */
 #define MOST_TOGETHER 32
+/* Occluders near an object that it is held against. */
+#define NEAR 6
 
 /* A blocker as a node's boxes see it, a bit for each. */
 typedef struct seen {
@@ -33,8 +36,10 @@ typedef struct planes {
     umb_allocator allocator;
     const umb_planes_kernels *kernels;
     const umb_box_kernels *box_kernels;
-    umb_selector selector;
+    umb_chooser chooser;
     umb_blockers blockers;
+    umb_near_blockers near;
+    bool looks_near; /* objects are held against what is near them, too */
     const umb_choice *choice;
     uint16_t *arena; /* lists of blockers: their number, then each */
     uint32_t *hidden; /* per blocker: boxes that it hid, alone or with others */
@@ -57,7 +62,7 @@ static umb_result create(const umb_allocator *allocator, umb_isa isa, void **sta
     p->allocator = *allocator;
     p->kernels = umb_planes_kernels_get(isa);
     p->box_kernels = umb_box_kernels_get(isa);
-    umb_selector_create(&p->selector, allocator);
+    umb_chooser_create(&p->chooser, allocator);
     *state = p;
     return UMB_OK;
 }
@@ -66,8 +71,9 @@ static void destroy(void *state)
 {
     planes *p = state;
     umb_allocator a = p->allocator;
-    umb_selector_free(&p->selector);
+    umb_chooser_free(&p->chooser);
     umb_blockers_free(&p->blockers, &a);
+    umb_near_blockers_free(&p->near, &a);
     umb_planes_cache_free(&p->cache, &a);
     umb_memory_free(&a, p->arena, p->arena_capacity * sizeof *p->arena);
     umb_memory_free(&a, p->hidden, p->hidden_capacity * sizeof *p->hidden);
@@ -89,8 +95,8 @@ static bool reserve(planes *p, uint32_t wanted)
 /* Feedback of the last frame. */
 static void tell_selector(planes *p)
 {
-    for (uint32_t i = 0; i < p->blockers.count; ++i) {
-        umb_select_feedback(&p->selector, p->blockers.list[i].occluder, p->hidden[i]);
+    for (uint32_t i = 0; i < p->near.chosen; ++i) {
+        umb_select_feedback(&p->chooser.selector, p->blockers.list[i].occluder, p->hidden[i]);
     }
 }
 
@@ -121,29 +127,41 @@ void umb_planes_count(const void *state, uint64_t *kept, uint64_t *made)
     *made = p->cache.made;
 }
 
+static uint32_t wanted_of(const umb_choice *choice)
+{
+    uint32_t wanted = choice->budget != 0 ? choice->budget : CHOSEN;
+    return wanted < MOST ? wanted : MOST;
+}
+
+static umb_result make_ahead(void *state, const umb_choice *choice)
+{
+    planes *p = state;
+    return umb_chooser_prepare(&p->chooser, choice, p->box_kernels, wanted_of(choice));
+}
+
 static umb_result choose(void *state, const umb_choice *choice)
 {
     planes *p = state;
-    uint32_t wanted = choice->budget != 0 ? choice->budget : CHOSEN;
-    wanted = wanted < UINT16_MAX ? wanted : UINT16_MAX - 1;
-    if ((choice->coherence & UMB_COHERENCE_REST) != 0 && p->selector.rest_structure == choice->scene->structure) {
+    uint32_t wanted = wanted_of(choice);
+    if ((choice->coherence & UMB_COHERENCE_REST) != 0 && p->chooser.selector.rest_structure == choice->scene->structure) {
         tell_selector(p);
     }
     p->choice = choice;
-    p->blockers.count = 0;
-    if (!choose_way(p, choice) || !reserve(p, wanted) || !umb_blockers_begin(&p->blockers, &p->allocator, &choice->viewer, wanted)) {
+    p->blockers.count = p->near.chosen = 0;
+    p->looks_near = (choice->coherence & UMB_COHERENCE_LEAVES) != 0 && choice->viewer.point_count == 1 && !choice->viewer.parallel;
+    if (!choose_way(p, choice) || !reserve(p, wanted) || !umb_blockers_begin(&p->blockers, &p->allocator, &choice->viewer, wanted + UMB_NEAR_BLOCKERS_MOST)) {
         return UMB_ERROR_MEMORY;
     }
-    umb_result result = umb_select_begin(&p->selector, choice, p->box_kernels);
+    umb_result result = umb_chooser_begin(&p->chooser, choice, p->box_kernels, wanted);
     umb_pick pick;
-    while (result == UMB_OK && p->blockers.count < wanted && umb_select_next(&p->selector, &pick)) {
+    while (result == UMB_OK && p->blockers.count < wanted && umb_chooser_next(&p->chooser, &pick)) {
         umb_blockers_add(&p->blockers, &(umb_blocker_def){.place = pick.place,
                                                           .facets = pick.facets,
                                                           .occluder = pick.occluder,
                                                           .set = pick.set,
                                                           .facet = pick.facet});
     }
-    if (result != UMB_OK || p->selector.failed) {
+    if (result != UMB_OK || umb_chooser_failed(&p->chooser) || !umb_near_blockers_begin(&p->near, &p->allocator, &p->blockers)) {
         return UMB_ERROR_MEMORY;
     }
     umb_blockers_join(&p->blockers);
@@ -382,7 +400,7 @@ static uint32_t hand_down(planes *p, uint32_t slot, uint32_t parent)
             p->arena[at + 1 + count++] = p->seen[i].blocker;
         }
     }
-    if (count == 0) {
+    if (count == 0 && !p->looks_near) {
         return UMB_TOKEN_CLEAR;
     }
     p->arena[at] = (uint16_t)count;
@@ -396,6 +414,13 @@ static void ask(void *state, umb_query *q)
     const uint16_t *list = p->arena + q->token;
     uint32_t hidden = 0;
     umb_near_boxes boxes;
+    if (list[0] == 0) {
+        q->hidden = 0;
+        for (uint32_t left = q->mask; left != 0; left &= left - 1) {
+            q->tokens[__builtin_ctz(left)] = p->looks_near ? q->token : UMB_TOKEN_CLEAR;
+        }
+        return;
+    }
     p->kernels->place(q->boxes, p->blockers.origin_high, p->blockers.origin_low, &boxes);
     p->seen_count = 0;
     p->choice->stats->tests += list[0];
@@ -419,11 +444,60 @@ static void ask(void *state, umb_query *q)
     }
 }
 
+/* One box, eight times. */
+static umb_node node_of(const umb_aabb *box)
+{
+    umb_node node = {.count = 1};
+    for (int axis = 0; axis < 3; ++axis) {
+        for (uint32_t slot = 0; slot < UMB_NODE_WIDTH; ++slot) {
+            node.min[axis][slot] = box->min[axis];
+            node.max[axis][slot] = box->max[axis];
+        }
+    }
+    return node;
+}
+
+/* What is left is held against what looks large from where it stands, towards the viewer. */
+static bool hides_object(void *state, uint32_t object, uint32_t token)
+{
+    planes *p = state;
+    const umb_object *o = &p->choice->scene->objects[object];
+    double middle[3];
+    uint32_t count = 0, tried = 0;
+    (void)token;
+    for (int k = 0; k < 3; ++k) {
+        middle[k] = 0.5 * ((double)o->bounds.min[k] + o->bounds.max[k]);
+    }
+    const umb_leaf_entry *list = p->looks_near ? umb_chooser_near(&p->chooser, middle, &count) : NULL;
+    if (count == 0) {
+        return false;
+    }
+    umb_node node = node_of(&o->bounds);
+    umb_query q = {.boxes = &node, .mask = 1};
+    umb_near_boxes boxes;
+    p->kernels->place(&node, p->blockers.origin_high, p->blockers.origin_low, &boxes);
+    for (uint32_t i = 0; i < count && tried < NEAR; ++i) {
+        seen s;
+        if (list[i].occluder == o->occluder || !umb_chooser_takes(&p->chooser, list[i].occluder)) {
+            continue;
+        }
+        uint32_t blocker = umb_near_blockers_get(&p->near, &p->blockers, &p->chooser, &list[i]);
+        tried += 1;
+        p->choice->stats->tests += blocker != UMB_NONE;
+        if (blocker != UMB_NONE && look(p, &q, &boxes, blocker, &s) && (s.full & 1u) != 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
 const umb_method_ops umb_planes_method = {
     .name = "planes",
     .class_ = UMB_CLASS_STRICT,
     .create = create,
     .destroy = destroy,
     .choose = choose,
+    .make_ahead = make_ahead,
     .ask = ask,
+    .hides_object = hides_object,
 };

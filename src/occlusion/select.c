@@ -186,7 +186,7 @@ static double score_corners(const umb_selector *s, const umb_vec3 *corners, uint
         return -umb_vec3_dot(area, umb_vec3_from_double(s->choice->viewer.points[0]));
     }
     double distance = umb_vec3_length(centre), front = umb_measure_area_angle(area, centre);
-    switch (s->by) {
+    switch (s->both_sides ? UMB_SELECT_AREA_ANGLE : s->by) {
     case UMB_SELECT_AREA_ANGLE:
         return front;
     case UMB_SELECT_UMBRA_GROWTH: {
@@ -209,15 +209,14 @@ static double score_facet(const umb_selector *s, const umb_pick *p, uint32_t fac
         corners[i] = relative(s, p, p->facets->corners[f->first + i]);
     }
     double score = score_corners(s, corners, f->count) * (p->place->mirrored ? -1.0 : 1.0);
-    score = f->two_sided ? fabs(score) : score;
+    score = f->two_sided || s->both_sides ? fabs(score) : score;
     return score > 0.0 && score < 1e30 ? score : 0.0;
 }
 
-static umb_pick pick_of(const umb_selector *s, uint32_t occluder, uint32_t facet, float score)
+umb_pick umb_select_pick(const umb_selector *s, const umb_committed *scene, uint32_t occluder, uint32_t facet, float score)
 {
-    const umb_occluder *place = &s->choice->scene->occluders[occluder];
     bool welded = s->known.set_of[occluder] == UMB_SET_WELDED;
-    return (umb_pick){.place = place,
+    return (umb_pick){.place = &scene->occluders[occluder],
                       .facets = &s->known.sets[s->known.set_of[occluder]].facets,
                       .occluder = occluder,
                       .set = welded ? UMB_NONE : occluder,
@@ -225,26 +224,57 @@ static umb_pick pick_of(const umb_selector *s, uint32_t occluder, uint32_t facet
                       .score = score};
 }
 
+void umb_select_faces(const umb_selector *s, const umb_pick *pick, umb_select_look *out)
+{
+    bool body = pick->facet == UMB_NONE;
+    uint32_t first = body ? 0 : pick->facet, end = body ? pick->facets->facet_count : pick->facet + 1, corners_in_all = 0;
+    *out = (umb_select_look){.two_sided = !body && pick->facets->facets[pick->facet].two_sided};
+    for (uint32_t i = first; i < end && out->count < UMB_SELECT_FACES; ++i) {
+        const umb_facet *f = &pick->facets->facets[i];
+        umb_vec3 corners[UMB_FACET_CORNERS];
+        for (uint32_t k = 0; k < f->count; ++k) {
+            corners[k] = relative(s, pick, pick->facets->corners[f->first + k]);
+            out->centre = umb_vec3_add(out->centre, corners[k]);
+        }
+        corners_in_all += f->count;
+        out->areas[out->count++] = umb_vec3_scale(area_vector(corners, f->count), pick->place->mirrored ? -1.0 : 1.0);
+    }
+    out->centre = umb_vec3_scale(out->centre, corners_in_all > 0 ? 1.0 / corners_in_all : 0.0);
+}
+
+bool umb_select_rests(const umb_selector *s, uint32_t occluder)
+{
+    return s->rests[occluder].until > s->frame;
+}
+
+float umb_select_score(const umb_selector *s, const umb_pick *pick)
+{
+    bool body = pick->facet == UMB_NONE;
+    uint32_t first = body ? 0 : pick->facet, end = body ? pick->facets->facet_count : pick->facet + 1;
+    double sum = 0.0;
+    for (uint32_t i = first; i < end; ++i) {
+        sum += score_facet(s, pick, i);
+    }
+    return (float)sum;
+}
+
 /* An occluder's own candidates, with their own scores. */
 static void expand(umb_selector *s, uint32_t occluder)
 {
-    umb_pick p = pick_of(s, occluder, UMB_NONE, 0.0f);
+    umb_pick p = umb_select_pick(s, s->choice->scene, occluder, UMB_NONE, 0.0f);
     uint32_t ref = UMB_REF_OCCLUDER | occluder;
-    if (s->rests[occluder].met == s->frame) {
+    if (s->rests[occluder].met == s->searches) {
         return;
     }
-    s->rests[occluder].met = s->frame;
-    if ((s->choice->coherence & UMB_COHERENCE_REST) != 0 && s->rests[occluder].until > s->frame) {
+    s->rests[occluder].met = s->searches;
+    if ((s->choice->coherence & UMB_COHERENCE_REST) != 0 && umb_select_rests(s, occluder)) {
         s->choice->stats->resting += 1;
         return;
     }
     if (umb_occluder_is_body(&s->known, s->choice->scene, occluder)) {
-        double sum = 0.0;
-        for (uint32_t i = 0; i < p.facets->facet_count; ++i) {
-            sum += score_facet(s, &p, i);
-        }
-        if (sum > 0.0) {
-            push(s, (umb_candidate){(float)sum, ref, UMB_NONE, 0, 1});
+        float score = umb_select_score(s, &p);
+        if (score > 0.0f) {
+            push(s, (umb_candidate){score, ref, UMB_NONE, 0, 1});
         }
         return;
     }
@@ -260,16 +290,31 @@ static void expand(umb_selector *s, uint32_t occluder)
     }
 }
 
-umb_result umb_select_begin(umb_selector *s, const umb_choice *choice, const umb_box_kernels *kernels)
+bool umb_select_follow(umb_selector *s, const umb_choice *choice)
 {
+    s->frame += 1;
+    s->failed = false;
+    return umb_occluder_sets_follow(&s->known, choice) && follow_rests(s, choice->scene);
+}
+
+/* At the root. planes: of the frustum that is to be kept to. */
+static umb_result start(umb_selector *s, const umb_choice *choice, const umb_box_kernels *kernels, uint16_t planes)
+{
+    const umb_tree *tree = choice->tree;
     s->choice = choice;
     s->kernels = kernels;
     s->failed = false;
     s->heap_count = 0;
-    s->frame += 1;
-    if (!umb_occluder_sets_follow(&s->known, choice) || !follow_rests(s, choice->scene)) {
-        return UMB_ERROR_MEMORY;
+    s->searches += 1;
+    if (tree->node_count > 0) {
+        uint32_t top = tree->flat ? tree->node_count + tree->block_count - 1 : 0;
+        push(s, (umb_candidate){FULL_ANGLE, UMB_REF_NODE | top, UMB_NONE, planes, 0});
     }
+    return s->failed ? UMB_ERROR_MEMORY : UMB_OK;
+}
+
+void umb_select_look_from(umb_selector *s, const umb_choice *choice)
+{
     const umb_viewer *v = &choice->viewer;
     for (int i = 0; i < 3; ++i) {
         s->eye[i] = 0.0;
@@ -277,12 +322,25 @@ umb_result umb_select_begin(umb_selector *s, const umb_choice *choice, const umb
             s->eye[i] += v->points[k][i] / v->point_count;
         }
     }
-    const umb_tree *tree = choice->tree;
-    if (tree->node_count > 0) {
-        uint32_t top = tree->flat ? tree->node_count + tree->block_count - 1 : 0;
-        push(s, (umb_candidate){FULL_ANGLE, UMB_REF_NODE | top, UMB_NONE, choice->frustum->all_planes, 0});
-    }
-    return s->failed ? UMB_ERROR_MEMORY : UMB_OK;
+    s->choice = choice;
+    s->both_sides = false;
+}
+
+umb_result umb_select_begin(umb_selector *s, const umb_choice *choice, const umb_box_kernels *kernels)
+{
+    umb_select_look_from(s, choice);
+    return start(s, choice, kernels, choice->frustum->all_planes);
+}
+
+umb_result umb_select_from(umb_selector *s, const umb_choice *choice, const umb_box_kernels *kernels, const double eye[3])
+{
+    memcpy(s->eye, eye, sizeof s->eye);
+    s->all = *choice;
+    s->all.mask = (umb_mask){0};
+    s->all.coherence = 0;
+    s->all.viewer.parallel = false;
+    s->both_sides = true;
+    return start(s, &s->all, kernels, 0);
 }
 
 bool umb_select_next(umb_selector *s, umb_pick *out)
@@ -291,7 +349,7 @@ bool umb_select_next(umb_selector *s, umb_pick *out)
         umb_candidate c = pop(s);
         uint32_t number = c.ref & UMB_REF_NUMBER;
         if (c.ready) {
-            *out = pick_of(s, number, c.facet, c.score);
+            *out = umb_select_pick(s, s->choice->scene, number, c.facet, c.score);
             return true;
         }
         if ((c.ref & UMB_REF_KIND) == UMB_REF_NODE) {

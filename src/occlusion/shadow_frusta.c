@@ -6,8 +6,8 @@
  * that a box lies beside is not looked at below it. Objects that are their shape are held against them by their parts, boxes
  * under a transform, and single triangles. Occluders are those that look largest, then of these the ones that hold most
  * samples, and with UMB_COHERENCE_LIST first those that hid most in the last frame. */
+#include "chooser.h"
 #include "power.h"
-#include "select.h"
 #include "shape_hull.h"
 
 #include <string.h>
@@ -24,7 +24,7 @@ typedef struct frusta {
     umb_allocator allocator;
     const umb_planes_kernels *kernels;
     const umb_box_kernels *box_kernels;
-    umb_selector selector;
+    umb_chooser chooser;
     umb_blockers blockers; /* the candidates */
     umb_power power;
     umb_shadow_viewer viewer;
@@ -49,7 +49,7 @@ static umb_result create(const umb_allocator *allocator, umb_isa isa, void **sta
     f->allocator = *allocator;
     f->kernels = umb_planes_kernels_get(isa);
     f->box_kernels = umb_box_kernels_get(isa);
-    umb_selector_create(&f->selector, allocator);
+    umb_chooser_create(&f->chooser, allocator);
     *state = f;
     return UMB_OK;
 }
@@ -58,7 +58,7 @@ static void destroy(void *state)
 {
     frusta *f = state;
     umb_allocator a = f->allocator;
-    umb_selector_free(&f->selector);
+    umb_chooser_free(&f->chooser);
     umb_blockers_free(&f->blockers, &a);
     umb_memory_free(&a, f->holds, f->hold_capacity * sizeof *f->holds);
     umb_memory_free(&a, f->order, f->order_capacity * sizeof *f->order);
@@ -92,7 +92,7 @@ static void learn(frusta *f, const umb_committed *scene)
     }
     for (uint32_t i = 0; i < f->chosen && same; ++i) {
         uint32_t occluder = f->blockers.list[f->order[i]].occluder;
-        umb_select_feedback(&f->selector, occluder, f->score[occluder]);
+        umb_select_feedback(&f->chooser.selector, occluder, f->score[occluder]);
     }
     f->structure = scene->structure;
     f->chosen = 0;
@@ -101,7 +101,7 @@ static void learn(frusta *f, const umb_committed *scene)
 static void find_candidates(frusta *f, uint32_t most)
 {
     umb_pick pick;
-    while (f->blockers.count < most && umb_select_next(&f->selector, &pick)) {
+    while (f->blockers.count < most && umb_chooser_next(&f->chooser, &pick)) {
         umb_blocker_def def = {pick.place, pick.facets, pick.occluder, pick.set, pick.facet};
         (void)umb_blockers_add(&f->blockers, &def);
     }
@@ -121,18 +121,28 @@ static void prefer_past(frusta *f)
     }
 }
 
+static uint32_t budget_of(const umb_choice *choice)
+{
+    uint32_t budget = choice->budget != 0 ? choice->budget : CHOSEN;
+    return budget < MOST ? budget : MOST;
+}
+
+static umb_result make_ahead(void *state, const umb_choice *choice)
+{
+    frusta *f = state;
+    return umb_chooser_prepare(&f->chooser, choice, f->box_kernels, CANDIDATES * budget_of(choice));
+}
+
 static umb_result choose(void *state, const umb_choice *choice)
 {
     frusta *f = state;
-    uint32_t budget = choice->budget != 0 ? choice->budget : CHOSEN;
-    budget = budget < MOST ? budget : MOST;
-    uint32_t most = CANDIDATES * budget;
+    uint32_t budget = budget_of(choice), most = CANDIDATES * budget;
     f->choice = choice;
     if (!reserve(f, budget, most, choice->scene->occluder_count)) {
         return UMB_ERROR_MEMORY;
     }
     learn(f, choice->scene);
-    umb_result result = umb_select_begin(&f->selector, choice, f->box_kernels);
+    umb_result result = umb_chooser_begin(&f->chooser, choice, f->box_kernels, most);
     if (result != UMB_OK || !umb_blockers_begin(&f->blockers, &f->allocator, &choice->viewer, most)) {
         return UMB_ERROR_MEMORY;
     }
@@ -280,6 +290,7 @@ const umb_method_ops umb_shadow_frusta_method = {
     .create = create,
     .destroy = destroy,
     .choose = choose,
+    .make_ahead = make_ahead,
     .ask = ask,
     .hides_object = hides_object,
 };

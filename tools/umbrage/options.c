@@ -306,6 +306,7 @@ static const char *read_coherence(options *o, const char *text)
                  {"conservative", UMB_COHERENCE_CONSERVATIVE},
                  {"rest", UMB_COHERENCE_REST},
                  {"planes", UMB_COHERENCE_PLANES},
+                 {"leaves", UMB_COHERENCE_LEAVES},
                  {"all", UMB_COHERENCE_ALL}};
     for (;;) {
         size_t length = strcspn(text, ","), i = 0;
@@ -314,7 +315,7 @@ static const char *read_coherence(options *o, const char *text)
             ++i;
         }
         if (i == sizeof names / sizeof names[0]) {
-            return "none, all, or some of list, hierarchy, propagation, conservative, rest, planes, with commas";
+            return "none, all, or some of list, hierarchy, propagation, conservative, rest, planes, leaves, with commas";
         }
         o->coherence |= names[i].bits;
         if (text[length] == '\0') {
@@ -513,7 +514,7 @@ static const option_spec specs[] = {
     {"update", 0, SCENES, "NAME", read_update, "how the index follows what moves: refit, delete-insert, lca, lazy, deepest, incremental, overlapping"},
     {"buffer", 0, VIEWS, "WxH", read_buffer, "the method's own raster (default 1024x288)"},
     {"coherence", 0, MANY_VIEWS, "NAMES", read_coherence,
-     "carry over: list, hierarchy, propagation, conservative, rest, planes, all (default none)"},
+     "carry over: list, hierarchy, propagation, conservative, rest, planes, leaves, all (default none)"},
     {"occluder-budget", 0, MANY_VIEWS, "N", read_budget, "draw at most N occluders a frame (default: all)"},
     {"min-pixels", 0, VIEWS, "P", read_min_pixels,
      "drop objects under P pixels both ways (default 0: none)"},

@@ -124,6 +124,9 @@ static int setup_cullers(setup *s, const options *o)
                           .coherence = o->coherence,
                           .occluder_budget = o->occluder_budget};
     umb_result result = umb_culler_create(s->index, &def, &s->culler);
+    if (result == UMB_OK && (o->coherence & UMB_COHERENCE_LEAVES) != 0) {
+        result = umb_culler_prepare(s->culler);
+    }
     def.method = UMB_METHOD_NONE;
     if (result == UMB_OK) {
         result = umb_culler_create(s->index, &def, &s->frustum);
