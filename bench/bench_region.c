@@ -1,10 +1,11 @@
 /* Leyvand's tables again, and how cost and set size depend on the method's settings: one view cell at a time.
  *
- *   bench_region DATA [--only TEXT] [--rays N] [--repeat N] [--most TRIANGLES] [--plots FOLDER]
+ *   bench_region DATA [--only TEXT] [--rays N] [--effort N|none] [--repeat N] [--most TRIANGLES] [--plots FOLDER]
  *
  * DATA is bench/papers/leyvand.csv, which says what is measured. Prints Markdown tables: times are processor time, the least of
  * --repeat (3) answers (of the refinement: of one) on one core, sets in triangles of their objects and in objects. "Seen" is what --rays (2M)
- * rays from the cell prove; what an answer lacks of it is a miss. --only: rows whose table or label contains TEXT;
+ * rays from the cell prove; what an answer lacks of it is a miss; with --rays 0 nobody looks and the time to load is short. --effort: of the
+ * refinement (0, the default: the library's own; none: no refinement). --only: rows whose table or label contains TEXT;
  * --most: leave out larger generated scenes. --plots writes region-TABLE-time.svg and -size.svg for the sweeps.
  * Exit code 1 on a miss. */
 #include <inttypes.h>
@@ -51,7 +52,8 @@ typedef struct study {
     uint32_t place_count, row_count;
     const char *only, *plots;
     uint64_t rays, most;
-    uint32_t repeat;
+    uint32_t repeat, effort;
+    bool refine;
     umb_error error;
 } study;
 
@@ -203,8 +205,8 @@ static bool world_load(world *w, study *s, const char *scene)
     }
     umb_region_def def = {.error = &s->error};
     w->scene = model_scene(w->model, true, (umb_tasks){0}, NULL, &s->error);
-    w->oracle = w->scene != NULL ? truth_create(w->model, &s->error) : NULL;
-    if (w->oracle == NULL || umb_index_create(w->scene, NULL, &w->index) != UMB_OK ||
+    w->oracle = w->scene != NULL && s->rays > 0 ? truth_create(w->model, &s->error) : NULL;
+    if (w->scene == NULL || (w->oracle == NULL && s->rays > 0) || umb_index_create(w->scene, NULL, &w->index) != UMB_OK ||
         umb_region_create(w->index, &def, &w->region) != UMB_OK) {
         if (s->error.text[0] == '\0') {
             copy(s->error.text, sizeof s->error.text, "not enough memory");
@@ -258,7 +260,7 @@ static bool ask(study *s, world *w, const umb_region_query *q, bool refine, answ
     }
     double start = processor_ms();
     if (result == UMB_OK && refine) {
-        result = umb_region_refine(w->region, 0, a);
+        result = umb_region_refine(w->region, s->effort, a);
     }
     out->refine_ms = processor_ms() - start;
     out->pvs = a->pvs_count;
@@ -285,9 +287,10 @@ static bool look(study *s, world *w, const umb_region_query *q, const umb_region
     bool ok = hidden != NULL && shown != NULL;
     if (ok) {
         memset(hidden, 1, objects);
-        for (uint32_t k = 0; k < a->refined_count; ++k) {
-            hidden[a->refined[k]] = 0;
-            shown[a->refined[k]] = 1;
+        const uint32_t *ids = s->refine ? a->refined : a->pvs;
+        for (uint32_t k = 0; k < (s->refine ? a->refined_count : a->pvs_count); ++k) {
+            hidden[ids[k]] = 0;
+            shown[ids[k]] = 1;
         }
         region_cell cell = {.near_distance = 0.0};
         memcpy(cell.min, q->min, sizeof cell.min);
@@ -304,7 +307,7 @@ static bool look(study *s, world *w, const umb_region_query *q, const umb_region
 
 static bool was_seen(const world *w, uint32_t object)
 {
-    uint32_t first = w->seen.witness_of[object];
+    uint32_t first = w->seen.witness_of != NULL ? w->seen.witness_of[object] : MODEL_NONE;
     return first != MODEL_NONE && w->seen.witnesses[first].confirmed;
 }
 
@@ -330,10 +333,10 @@ static bool measure(study *s, world *w, row *r)
                        r->place);
         return false;
     }
-    if (!ask(s, w, &q, true, &r->ours, &a) || !look(s, w, &q, &a)) {
+    if (!ask(s, w, &q, s->refine, &r->ours, &a) || (s->rays > 0 && !look(s, w, &q, &a))) {
         return false;
     }
-    r->ours.misses = misses(w, a.pvs, a.pvs_count) + misses(w, a.refined, a.refined_count);
+    r->ours.misses = misses(w, a.pvs, a.pvs_count) + (s->refine ? misses(w, a.refined, a.refined_count) : 0);
     if (r->is_thesis) {
         q.outer = 2.0;
         q.umbrae = 1;
@@ -353,6 +356,7 @@ static bool measure(study *s, world *w, row *r)
     (void)fprintf(stderr, "%s %s: %.1f + %.1f ms, pvs %u, refined %u, seen %u, misses %u\n",
                   r->table, r->label, r->ours.solve_ms, r->ours.refine_ms, r->ours.pvs,
                   r->ours.refined, r->seen, r->ours.misses + r->thesis.misses);
+    fprintf(stderr, "   nodes %u queries %u occluders %u patches %u undecided %u\n", a.stats.nodes, a.stats.queries, a.stats.occluders, a.stats.patches, a.stats.undecided);
     return true;
 }
 
@@ -508,6 +512,7 @@ static bool read_settings(int count, char **words, study *s)
 {
     s->rays = 2000000;
     s->repeat = 3;
+    s->refine = true;
     for (int i = 2; i + 1 < count; i += 2) {
         if (strcmp(words[i], "--only") == 0) {
             s->only = words[i + 1];
@@ -515,6 +520,9 @@ static bool read_settings(int count, char **words, study *s)
             s->plots = words[i + 1];
         } else if (strcmp(words[i], "--rays") == 0) {
             s->rays = number_of(words[i + 1]);
+        } else if (strcmp(words[i], "--effort") == 0) {
+            s->refine = strcmp(words[i + 1], "none") != 0;
+            s->effort = s->refine ? (uint32_t)number_of(words[i + 1]) : 0;
         } else if (strcmp(words[i], "--most") == 0) {
             s->most = number_of(words[i + 1]);
         } else if (strcmp(words[i], "--repeat") == 0) {
@@ -523,7 +531,7 @@ static bool read_settings(int count, char **words, study *s)
             return false;
         }
     }
-    return count % 2 == 0 && s->rays != 0 && s->repeat != 0;
+    return count % 2 == 0 && s->repeat != 0;
 }
 
 int main(int count, char **words)

@@ -2,7 +2,8 @@
 #include <math.h>
 #include <string.h>
 
-#include "ray_map.h"
+#include "ray_chains.h"
+#include "ray_far.h"
 
 /* Everything about one blocker in one tile row. */
 typedef struct band {
@@ -12,131 +13,17 @@ typedef struct band {
     bool half;
     uint32_t row; /* of tiles */
     double s;     /* its first corner */
-    uint8_t top[UMB_UMBRA_VERTICES + 1], bottom[UMB_UMBRA_VERTICES + 1]; /* chains of vertices */
-    uint32_t top_count, bottom_count;
+    umb_ray_chains chains;
     umb_umbra umbra;
     int16_t place[UMB_UMBRA_VERTICES]; /* of a vertex in umbra.vertices, -1: not there */
     uint32_t used;
 } band;
 
-/* ---- chains ----------------------------------------------------------------------------------- */
-
-typedef struct sight {
-    double t, top, bottom; /* as seen from where all lines of the row nearly meet */
-    uint8_t vertex;
-} sight;
-
-static double slope_of(double rise, double run)
-{
-    return rise / run;
-}
-
-/* A chain of a convex body that is highest (sign 1) or lowest (-1) as seen from there. Any chain would be
- * right. */
-static uint32_t hull_chain(const sight *p, uint32_t count, double sign, uint8_t *chain)
-{
-    uint32_t kept[UMB_UMBRA_VERTICES], n = 0;
-    for (uint32_t i = 0; i < count; ++i) {
-        double y = sign > 0.0 ? p[i].top : -p[i].bottom;
-        if (n > 0 && p[kept[n - 1]].t == p[i].t) {
-            double last = sign > 0.0 ? p[kept[n - 1]].top : -p[kept[n - 1]].bottom;
-            if (last >= y) {
-                continue;
-            }
-            --n;
-        }
-        while (n >= 2) {
-            const sight *a = &p[kept[n - 2]], *b = &p[kept[n - 1]];
-            double ya = sign > 0.0 ? a->top : -a->bottom, yb = sign > 0.0 ? b->top : -b->bottom;
-            if ((yb - ya) * (p[i].t - a->t) > (y - ya) * (b->t - a->t)) {
-                break;
-            }
-            --n;
-        }
-        kept[n++] = i;
-    }
-    for (uint32_t i = 0; i < n; ++i) {
-        chain[i] = p[kept[i]].vertex;
-    }
-    return n;
-}
-
-static void convex_chains(band *d)
-{
-    const umb_ray_map *m = d->map;
-    const umb_ray_blocker *b = d->blocker;
-    sight sights[UMB_UMBRA_VERTICES];
-    double s = d->s + 0.5 * UMB_TILE * m->ds;
-    for (uint32_t i = 0; i < b->count; ++i) {
-        const umb_ray_point *p = &b->vertices[i];
-        double alpha = m->alpha0 + m->alpha1 * p->u, beta = m->beta0 + m->beta1 * p->u;
-        sight x = {(p->v - alpha * s) / beta, slope_of(p->z - m->frame->z1, beta),
-                   slope_of(p->z - m->frame->z0, beta), (uint8_t)i};
-        uint32_t k = i;
-        for (; k > 0 && sights[k - 1].t > x.t; --k) {
-            sights[k] = sights[k - 1];
-        }
-        sights[k] = x;
-    }
-    d->top_count = hull_chain(sights, b->count, 1.0, d->top);
-    d->bottom_count = hull_chain(sights, b->count, -1.0, d->bottom);
-}
-
-static double value_at(const umb_ray_map *m, const umb_ray_point *p, double s, double t)
-{
-    return p->v - (m->alpha0 + m->alpha1 * p->u) * s - (m->beta0 + m->beta1 * p->u) * t;
-}
-
-/* The two chains of a ring between the vertex that lines from t0 on have to one side and the one that lines up to t1
- * have to the other. */
-static void ring_chains(band *d, double t0, double t1)
-{
-    const umb_ray_map *m = d->map;
-    const umb_ray_blocker *b = d->blocker;
-    double s = d->s + 0.5 * UMB_TILE * m->ds, least = INFINITY, most = -INFINITY;
-    uint32_t low = 0, high = 0, n = 0;
-    for (uint32_t i = 0; i < b->ring; ++i) {
-        double f0 = value_at(m, &b->vertices[i], s, t0), f1 = value_at(m, &b->vertices[i], s, t1);
-        low = f0 < least ? i : low;
-        least = f0 < least ? f0 : least;
-        high = f1 > most ? i : high;
-        most = f1 > most ? f1 : most;
-    }
-    double sums[2] = {0.0, 0.0};
-    for (uint32_t i = low; i != high; i = (i + 1) % b->ring) {
-        d->top[n++] = (uint8_t)i;
-        sums[0] += b->vertices[i].z;
-    }
-    d->top[n] = (uint8_t)high;
-    sums[0] = (sums[0] - b->vertices[low].z) / (n > 1 ? n - 1 : 1);
-    d->top_count = n + 1;
-    n = 0;
-    for (uint32_t i = low; i != high; i = (i + b->ring - 1) % b->ring) {
-        d->bottom[n++] = (uint8_t)i;
-        sums[1] += b->vertices[i].z;
-    }
-    d->bottom[n] = (uint8_t)high;
-    sums[1] = (sums[1] - b->vertices[low].z) / (n > 1 ? n - 1 : 1);
-    d->bottom_count = n + 1;
-    /* A chain without inner vertices is a straight edge between the two. */
-    double middle = 0.5 * (b->vertices[low].z + b->vertices[high].z);
-    double a = d->top_count > 2 ? sums[0] : middle, z = d->bottom_count > 2 ? sums[1] : middle;
-    if (a < z) {
-        uint8_t swap[UMB_UMBRA_VERTICES + 1];
-        memcpy(swap, d->top, sizeof swap);
-        memcpy(d->top, d->bottom, sizeof swap);
-        memcpy(d->bottom, swap, sizeof swap);
-        n = d->top_count;
-        d->top_count = d->bottom_count;
-        d->bottom_count = n;
-    }
-}
-
 /* ---- an umbra for the kernels -------------------------------------------------------------------- */
 
 /* Bounds at a vertex: numerators and denominators are sums of doubles, right to far less than a float's step. */
-static void bound_vertex(const umb_ray_map *m, const umb_ray_point *p, float ua, float ub, float error_u,
-                         umb_umbra_vertex *v)
+void umb_ray_bound_vertex(const umb_ray_map *m, const umb_ray_point *p, float ua, float ub, float error_u,
+                          umb_umbra_vertex *v)
 {
     double e = m->frame->error, up = p->z - m->frame->z1, rise = p->z - m->frame->z0;
     double a = p->u - ua, b = p->u - ub;
@@ -182,9 +69,15 @@ static uint8_t use_vertex(band *d, uint32_t i, uint32_t column, uint32_t columns
     v->error = (float)(4.0 * (0x1p-22 * size + lost + shift));
     v->u = (float)p->u;
     v->z = (float)p->z;
-    bound_vertex(m, p, d->umbra.ua, d->umbra.ub, d->umbra.error_u, v);
     d->place[i] = (int16_t)d->used;
     return (uint8_t)d->used++;
+}
+
+/* What pixels that straddle a vertex, which is used, see of it. */
+static void bound_vertex(band *d, uint32_t i)
+{
+    const umb_umbra *o = &d->umbra;
+    umb_ray_bound_vertex(d->map, &d->blocker->vertices[i], o->ua, o->ub, o->error_u, &d->umbra.vertices[d->place[i]]);
 }
 
 /* On which sides of a vertex lines of the run may pass: bit 0: below, bit 1: above. */
@@ -216,6 +109,7 @@ static uint32_t use_chain(band *d, const uint8_t *chain, uint32_t count, uint32_
         e.near_quotient = top ? !(za < 0.0 && zb < 0.0) : !(za > 0.0 && zb > 0.0);
         if (i > 0 && sides(&d->umbra.vertices[e.a], columns) == 3u) {
             *inner |= UINT64_C(1) << e.a;
+            bound_vertex(d, chain[i]);
         }
         if (may_cross(&d->umbra, e, columns)) {
             edges[n++] = e;
@@ -226,11 +120,11 @@ static uint32_t use_chain(band *d, const uint8_t *chain, uint32_t count, uint32_
 
 static bool same_outline(const band *d)
 {
-    if (d->top_count != d->bottom_count) {
+    if (d->chains.top_count != d->chains.bottom_count) {
         return false;
     }
-    for (uint32_t i = 0; i < d->top_count; ++i) {
-        const umb_ray_point *a = &d->blocker->vertices[d->top[i]], *b = &d->blocker->vertices[d->bottom[i]];
+    for (uint32_t i = 0; i < d->chains.top_count; ++i) {
+        const umb_ray_point *a = &d->blocker->vertices[d->chains.top[i]], *b = &d->blocker->vertices[d->chains.bottom[i]];
         if (a->u != b->u || a->v != b->v) {
             return false;
         }
@@ -250,7 +144,11 @@ static void use_inner_edges(band *d, uint32_t column, uint32_t columns)
         }
     }
     for (uint32_t i = b->ring; i < b->count; ++i) {
-        o->depth_inner |= UINT64_C(1) << use_vertex(d, i, column, columns);
+        uint32_t at = use_vertex(d, i, column, columns);
+        if (sides(&o->vertices[at], columns) == 3u) {
+            o->depth_inner |= UINT64_C(1) << at;
+            bound_vertex(d, i);
+        }
     }
 }
 
@@ -275,17 +173,17 @@ static void make_umbra(band *d, uint32_t column, uint32_t columns, bool floor, c
     o->error_u = (float)(0x1p-20 * fmax(u, f->hu) + 2.0 * f->error);
     o->error_z = (float)(0x1p-20 * z + 2.0 * f->error);
     o->floor = floor;
-    o->top_count = use_chain(d, d->top, d->top_count, column, columns, true, o->top, &o->top_inner);
-    o->low[0] = (uint32_t)d->place[d->top[0]];
-    o->high[0] = (uint32_t)d->place[d->top[d->top_count - 1]];
+    o->top_count = use_chain(d, d->chains.top, d->chains.top_count, column, columns, true, o->top, &o->top_inner);
+    o->low[0] = (uint32_t)d->place[d->chains.top[0]];
+    o->high[0] = (uint32_t)d->place[d->chains.top[d->chains.top_count - 1]];
     o->low[1] = o->low[0];
     o->high[1] = o->high[0];
     o->bottom_count = 0;
     o->bottom_inner = 0;
     if (!floor || !same_outline(d)) {
-        o->bottom_count = use_chain(d, d->bottom, d->bottom_count, column, columns, false, o->bottom, &o->bottom_inner);
-        o->low[1] = (uint32_t)d->place[d->bottom[0]];
-        o->high[1] = (uint32_t)d->place[d->bottom[d->bottom_count - 1]];
+        o->bottom_count = use_chain(d, d->chains.bottom, d->chains.bottom_count, column, columns, false, o->bottom, &o->bottom_inner);
+        o->low[1] = (uint32_t)d->place[d->chains.bottom[0]];
+        o->high[1] = (uint32_t)d->place[d->chains.bottom[d->chains.bottom_count - 1]];
     }
     if (!b->convex) {
         use_inner_edges(d, column, columns);
@@ -300,13 +198,13 @@ static umb_umbra_summary reach_of(const band *d, bool floor, const float span[2]
 {
     const umb_ray_frame *f = d->map->frame;
     umb_umbra_summary r = {-INFINITY, floor ? -INFINITY : INFINITY, 0.0f};
-    for (uint32_t i = 0; i < d->top_count; ++i) {
-        const umb_ray_point *p = &d->blocker->vertices[d->top[i]];
+    for (uint32_t i = 0; i < d->chains.top_count; ++i) {
+        const umb_ray_point *p = &d->blocker->vertices[d->chains.top[i]];
         double up = p->z - f->z1, from = up >= 0.0 ? p->u - span[0] : p->u - span[1];
         r.top = from > 0.0 ? fmaxf(r.top, (float)(up / from)) : INFINITY;
     }
-    for (uint32_t i = 0; i < d->bottom_count && !floor; ++i) {
-        const umb_ray_point *p = &d->blocker->vertices[d->bottom[i]];
+    for (uint32_t i = 0; i < d->chains.bottom_count && !floor; ++i) {
+        const umb_ray_point *p = &d->blocker->vertices[d->chains.bottom[i]];
         double rise = p->z - f->z0, from = rise >= 0.0 ? p->u - span[1] : p->u - span[0];
         r.bottom = from > 0.0 ? fminf(r.bottom, (float)(rise / from)) : -INFINITY;
     }
@@ -320,13 +218,13 @@ static void draw_run(band *d, uint32_t group, uint32_t from, uint32_t to)
     const float *span = m->spans[d->row * groups + group];
     double t0 = m->t0 + from * UMB_TILE * m->dt, t1 = m->t0 + (to + 1) * UMB_TILE * m->dt;
     if (!d->blocker->convex) {
-        ring_chains(d, t0, t1);
+        umb_ray_chains_ring(m, d->blocker, d->s + 0.5 * UMB_TILE * m->ds, t0, t1, &d->chains);
     }
     bool floor = d->blocker->floor;
-    for (uint32_t i = 0; floor && i < d->bottom_count; ++i) {
-        floor = d->blocker->on_floor[d->bottom[i]];
+    for (uint32_t i = 0; floor && i < d->chains.bottom_count; ++i) {
+        floor = d->blocker->on_floor[d->chains.bottom[i]];
     }
-    if (d->top_count < 2 || d->bottom_count < 2 || (d->half && !floor)) {
+    if (d->chains.top_count < 2 || d->chains.bottom_count < 2 || (d->half && !floor)) {
         return;
     }
     umb_umbra_summary reach = reach_of(d, floor, span);
@@ -393,6 +291,9 @@ static bool range_of_tiles(const band *d, uint32_t *from, uint32_t *to)
 
 void umb_ray_map_block(umb_ray_map *map, const umb_umbra_kernels *kernels, const umb_ray_blocker *b, bool half)
 {
+    if (umb_ray_map_block_far(map, kernels, b, half)) {
+        return;
+    }
     band d = {.map = map, .kernels = kernels, .blocker = b, .half = half};
     bool near = true;
     for (uint32_t i = 0; i < b->count; ++i) {
@@ -405,8 +306,8 @@ void umb_ray_map_block(umb_ray_map *map, const umb_umbra_kernels *kernels, const
             continue;
         }
         /* Far away the chains are the same from row to row; any would be right. */
-        if (b->convex && (near || d.row % UMB_TILE == 0 || d.top_count == 0)) {
-            convex_chains(&d);
+        if (b->convex && (near || d.row % UMB_TILE == 0 || d.chains.top_count == 0)) {
+            umb_ray_chains_convex(map, b, d.s + 0.5 * UMB_TILE * map->ds, &d.chains);
         }
         for (uint32_t g = from / UMB_TILE; g <= to / UMB_TILE; ++g) {
             uint32_t first = g * UMB_TILE, last = first + UMB_TILE - 1;

@@ -128,7 +128,7 @@ umb_result umb_ray_map_begin(umb_ray_map *map, const umb_allocator *a, const umb
                              umb_ray_kind kind, double outer, uint32_t resolution, uint32_t umbrae)
 {
     uint32_t columns = resolution / UMB_TILE, least = UMB_TILE;
-    uint32_t rows = kind != UMB_RAY_SLAB ? columns : (columns / 4 + least - 1) / least * least;
+    uint32_t rows = kind != UMB_RAY_SLAB ? columns : (columns / 8 + least - 1) / least * least;
     map_layout l = lay_out(rows, columns, umbrae);
     char *block = (char *)map->intervals;
     if (map->bytes != l.bytes) {

@@ -70,9 +70,16 @@ typedef struct umb_umbra_query {
     float top, bottom, depth; /* upper bound of m, lower bound of M, lower bound of u */
 } umb_umbra_query;
 
+/* One interval, for lanes from[r] to to[r] of row r of a tile (none: from > to). Names as in umb_umbra_tile. */
+typedef struct umb_umbra_strip {
+    float from[UMB_TILE], to[UMB_TILE];
+    float top, top_far, bottom_far, bottom, depth;
+} umb_umbra_strip;
+
 typedef struct umb_umbra_kernels {
     umb_isa isa;
     void (*draw)(umb_umbra_draw *d);
+    umb_umbra_summary (*fill)(umb_umbra_tile *tiles, uint32_t umbrae, const umb_umbra_strip *s, bool half);
     /* Pixels of a tile that what is asked about touches and no interval holds. */
     uint64_t (*open)(const umb_umbra_tile *tiles, uint32_t umbrae, const umb_umbra_query *q);
 } umb_umbra_kernels;

@@ -43,16 +43,19 @@ UMB_INLINE crossing cross(const umb_umbra *o, umb_umbra_edge edge, umb_fv row, u
     const umb_umbra_vertex *a = &o->vertices[edge.a], *b = &o->vertices[edge.b];
     umb_fv fa = at_corner(a, row, column), fb = at_corner(b, row, column);
     umb_fv zero = umb_fv_set(0.0f), one = umb_fv_set(1.0f);
+    crossing c;
+    c.here = (umb_iv)(((fa <= a->error) & (fb >= -b->error)) | ((fa >= -a->error) & (fb <= b->error)));
+    if (!umb_iv_any(c.here)) {
+        return c;
+    }
     umb_fv r = one / (fb - fa);
     umb_fv part = umb_fv_clamp(zero - fa * r, zero, one);
     umb_fv off = umb_fv_min(umb_fv_abs(r) * (a->error + b->error), one);
     float du = b->u - a->u, dz = b->z - a->z;
-    crossing c;
     c.u = part * du + a->u;
     c.z = part * dz + a->z;
     c.error_u = off * (du < 0.0f ? -du : du) + o->error_u;
     c.error_z = off * (dz < 0.0f ? -dz : dz) + o->error_z;
-    c.here = (umb_iv)(((fa <= a->error) & (fb >= -b->error)) | ((fa >= -a->error) & (fb <= b->error)));
     return c;
 }
 
@@ -132,7 +135,9 @@ UMB_INLINE void corners_of_vector(const umb_umbra *o, bool half, umb_fv row, umb
     }
     for (uint32_t e = 0; e < o->depth_count; ++e) {
         crossing c = cross(o, o->depth[e], row, column);
-        add_depth(o, &c, s);
+        if (umb_iv_any(c.here)) {
+            add_depth(o, &c, s);
+        }
     }
 }
 
@@ -384,6 +389,25 @@ static void draw(umb_umbra_draw *d)
     }
 }
 
+static umb_umbra_summary fill(umb_umbra_tile *tiles, uint32_t umbrae, const umb_umbra_strip *strip, bool half)
+{
+    const sums all = {umb_fv_set(strip->top), umb_fv_set(strip->top_far), umb_fv_set(strip->bottom_far),
+                      umb_fv_set(strip->bottom), umb_fv_set(strip->depth), umb_fv_set(0.0f)};
+    for (uint32_t r = 0; r < UMB_TILE; ++r) {
+        for (uint32_t j = 0; j < UMB_TILE; j += UMB_LANES) {
+            umb_fv lane = lanes_from((float)j);
+            umb_iv here = (umb_iv)((lane >= strip->from[r]) & (lane <= strip->to[r]));
+            sums s = all;
+            if (umb_iv_any(here) && half) {
+                merge_half(tiles, r * UMB_TILE + j, &s, here);
+            } else if (umb_iv_any(here)) {
+                merge_full(tiles, umbrae, r * UMB_TILE + j, &s, here);
+            }
+        }
+    }
+    return sum_up(tiles);
+}
+
 static uint64_t open_pixels(const umb_umbra_tile *tiles, uint32_t umbrae, const umb_umbra_query *q)
 {
     uint64_t open = 0;
@@ -404,4 +428,4 @@ static uint64_t open_pixels(const umb_umbra_tile *tiles, uint32_t umbrae, const 
     return open;
 }
 
-const umb_umbra_kernels KERNELS = {ISA, draw, open_pixels};
+const umb_umbra_kernels KERNELS = {ISA, draw, fill, open_pixels};
