@@ -14,6 +14,8 @@ typedef struct band {
     uint32_t row; /* of tiles */
     double s;     /* its first corner */
     umb_ray_chains chains;
+    uint8_t outline[UMB_RAY_OUTLINE]; /* of a disk */
+    uint32_t outline_count;
     umb_umbra umbra;
     int16_t place[UMB_UMBRA_VERTICES]; /* of a vertex in umbra.vertices, -1: not there */
     uint32_t used;
@@ -118,36 +120,19 @@ static uint32_t use_chain(band *d, const uint8_t *chain, uint32_t count, uint32_
     return n;
 }
 
-static bool same_outline(const band *d)
+/* What blocks of a disk is no farther and no nearer than its hull, as seen from above. */
+static void use_outline(band *d, uint32_t column, uint32_t columns)
 {
-    if (d->chains.top_count != d->chains.bottom_count) {
-        return false;
-    }
-    for (uint32_t i = 0; i < d->chains.top_count; ++i) {
-        const umb_ray_point *a = &d->blocker->vertices[d->chains.top[i]], *b = &d->blocker->vertices[d->chains.bottom[i]];
-        if (a->u != b->u || a->v != b->v) {
-            return false;
-        }
-    }
-    return true;
-}
-
-static void use_inner_edges(band *d, uint32_t column, uint32_t columns)
-{
-    const umb_ray_blocker *b = d->blocker;
     umb_umbra *o = &d->umbra;
-    for (uint32_t i = 0; i < b->inner_edge_count; ++i) {
-        umb_umbra_edge e = {use_vertex(d, b->inner_edges[i][0], column, columns),
-                            use_vertex(d, b->inner_edges[i][1], column, columns), 0};
+    for (uint32_t i = 0; i < d->outline_count; ++i) {
+        uint32_t from = d->outline[i], to = d->outline[i + 1 < d->outline_count ? i + 1 : 0];
+        umb_umbra_edge e = {use_vertex(d, from, column, columns), use_vertex(d, to, column, columns), 0};
+        if (sides(&o->vertices[e.a], columns) == 3u) {
+            o->depth_inner |= UINT64_C(1) << e.a;
+            bound_vertex(d, from);
+        }
         if (may_cross(o, e, columns)) {
             o->depth[o->depth_count++] = e;
-        }
-    }
-    for (uint32_t i = b->ring; i < b->count; ++i) {
-        uint32_t at = use_vertex(d, i, column, columns);
-        if (sides(&o->vertices[at], columns) == 3u) {
-            o->depth_inner |= UINT64_C(1) << at;
-            bound_vertex(d, i);
         }
     }
 }
@@ -180,13 +165,14 @@ static void make_umbra(band *d, uint32_t column, uint32_t columns, bool floor, c
     o->high[1] = o->high[0];
     o->bottom_count = 0;
     o->bottom_inner = 0;
-    if (!floor || !same_outline(d)) {
+    o->outlined = !b->convex;
+    if (!floor || b->convex) {
         o->bottom_count = use_chain(d, d->chains.bottom, d->chains.bottom_count, column, columns, false, o->bottom, &o->bottom_inner);
         o->low[1] = (uint32_t)d->place[d->chains.bottom[0]];
         o->high[1] = (uint32_t)d->place[d->chains.bottom[d->chains.bottom_count - 1]];
     }
-    if (!b->convex) {
-        use_inner_edges(d, column, columns);
+    if (o->outlined) {
+        use_outline(d, column, columns);
     }
 }
 
@@ -296,6 +282,7 @@ void umb_ray_map_block(umb_ray_map *map, const umb_umbra_kernels *kernels, const
     }
     band d = {.map = map, .kernels = kernels, .blocker = b, .half = half};
     bool near = true;
+    d.outline_count = b->convex ? 0 : umb_ray_hull(b->vertices, b->count, d.outline);
     for (uint32_t i = 0; i < b->count; ++i) {
         near = (i > 0 && near) || b->vertices[i].u < 16.0 * (map->frame->hu + map->frame->hv);
     }

@@ -6,7 +6,7 @@
 #include "ray_chains.h"
 
 /* What is nearer than so many times the cell's size changes its place in the map from row to row. */
-#define FAR 8.0
+#define FAR 4.0
 /* Of a pixel: what doubles lose in a place of the map is far less. */
 #define PIXEL_SLACK 0x1p-16
 
@@ -142,7 +142,7 @@ bool umb_ray_map_block_far(umb_ray_map *map, const umb_umbra_kernels *kernels, c
     }
     double loss;
     bounds_over(map, b, &c, floor, &d.strip, &loss);
-    if (!(loss <= map->dt * map->beta1)) {
+    if (!(loss <= 1.5 * map->dt * map->beta1)) {
         return false;
     }
     const umb_ray_point *p = b->vertices;

@@ -34,6 +34,8 @@ typedef struct umb_ray_map {
     bool *drawn;                   /* per tile */
     bool *stale;                   /* per group: its summary is behind */
     float (*spans)[2];             /* per tile row and group column: ua, ub of the cell in all slices there */
+    float (*group_spans)[3];       /* per group: the largest ua, the least and the largest ub */
+    double offset_most, slope_most; /* lines have |v| at most offset_most + slope_most |u| */
     size_t bytes;                  /* of the one block behind the arrays */
 } umb_ray_map;
 
@@ -60,14 +62,30 @@ typedef struct umb_ray_shape {
     umb_ray_point outline[UMB_RAY_OUTLINE];
     uint32_t count;
     double z0, z1; /* lowest and highest */
-    double u_min, u_max;
+    double u_min, u_max, v_min, v_max;
 } umb_ray_shape;
 
-/* Of at most UMB_RAY_POINTS points; what lies behind the cell is cut off. False: nothing is left. */
-bool umb_ray_shape_make(const umb_ray_frame *f, const umb_ray_point *points, uint32_t count, umb_ray_shape *out);
+/* Of at most UMB_RAY_POINTS points. False: all lie behind the cell. umb_ray_shape_outline() has to follow. */
+bool umb_ray_shape_measure(const umb_ray_frame *f, const umb_ray_point *points, uint32_t count, umb_ray_shape *out);
 
-/* True if every line of the map that meets the shape is blocked before it. */
-bool umb_ray_map_hides(umb_ray_map *map, const umb_umbra_kernels *kernels, const umb_ray_shape *shape);
+/* The outline of the same points; what lies behind the cell is cut off. in_order: the points are the corners of a convex
+ * outline, in order. False: nothing is left. */
+bool umb_ray_shape_outline(const umb_ray_frame *f, const umb_ray_point *points, uint32_t count, bool in_order,
+                           umb_ray_shape *out);
+
+/* The hull of points in (u, v): their numbers, in order; out has room for UMB_RAY_OUTLINE. Points that rounding leaves
+ * out lie within rounding of it, which errors of f and u allow for. */
+uint32_t umb_ray_hull(const umb_ray_point *points, uint32_t count, uint8_t *out);
+
+/* False if surely no line of the map meets the shape; it needs no outline. */
+bool umb_ray_map_meets(const umb_ray_map *map, const umb_ray_shape *shape);
+
+/* True if every line of the map that meets the shape is blocked before it. Else *tile is one whose lines are not. */
+bool umb_ray_map_hides(umb_ray_map *map, const umb_umbra_kernels *kernels, const umb_ray_shape *shape, uint32_t *tile);
+
+/* The same of the lines of one tile. */
+bool umb_ray_map_tile_hides(umb_ray_map *map, const umb_umbra_kernels *kernels, const umb_ray_shape *shape,
+                            uint32_t tile);
 
 /* An occluder in a frame. Chains run through its vertices; see umb_umbra. */
 typedef struct umb_ray_blocker {
@@ -75,10 +93,7 @@ typedef struct umb_ray_blocker {
     uint32_t count;
     bool convex;  /* any chain through the vertices lies in what blocks */
     bool floor;   /* what is lowest of it stands on the ground: nothing passes below */
-    /* Not convex: the border of a disk of triangles, in order, comes first; then its inner vertices. */
-    uint32_t ring;
-    const uint8_t (*inner_edges)[2];
-    uint32_t inner_edge_count;
+    uint32_t ring; /* not convex: the border of a disk of triangles, in order, comes first; then its inner vertices */
     bool on_floor[UMB_UMBRA_VERTICES]; /* the vertex lies on the ground or below */
 } umb_ray_blocker;
 

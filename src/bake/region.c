@@ -151,6 +151,18 @@ static void set_cell(umb_region *region, const umb_region_query *query)
     umb_box_corners(q->min, q->max, region->corners);
 }
 
+static void count_objects(umb_region *region, const umb_committed *c)
+{
+    region->objects = 0;
+    region->triangles = 0;
+    for (uint32_t i = 0; i < c->object_count; ++i) {
+        if (c->objects[i].live) {
+            region->objects += 1;
+            region->triangles += triangles_of(&c->objects[i]);
+        }
+    }
+}
+
 static umb_result prepare(umb_region *region, const umb_region_query *query)
 {
     const umb_tree *tree = umb_index_tree(region->index);
@@ -170,18 +182,15 @@ static umb_result prepare(umb_region *region, const umb_region_query *query)
     if (region->version != c->version) {
         memset(region->known, 0, region->known_capacity);
         region->version = c->version;
+        count_objects(region, c);
     }
+    region->answer.stats.objects = region->objects;
+    region->answer.stats.triangles = region->triangles;
     region->pieces.known = region->known;
     region->reach = largest(query, tree);
     set_cell(region, query);
     region->solids.count = region->solids.plane_count = 0;
     region->solids.reach = region->reach;
-    for (uint32_t i = 0; i < c->object_count; ++i) {
-        if (c->objects[i].live) {
-            region->answer.stats.objects += 1;
-            region->answer.stats.triangles += triangles_of(&c->objects[i]);
-        }
-    }
     return UMB_OK;
 }
 

@@ -32,6 +32,8 @@ struct umb_region {
     uint8_t *known; /* per occluder of this version of the scene */
     size_t known_capacity;
     uint64_t version;
+    uint32_t objects; /* live ones of this version, and their triangles */
+    uint64_t triangles;
     uint32_t *used; /* occluders that the walk found not hidden */
     size_t used_capacity, used_count;
     umb_solids solids; /* bodies of these, once there is something to refine */

@@ -96,21 +96,33 @@ static umb_result begin_maps(umb_region *r)
 
 /* ---- asking ------------------------------------------------------------------------------------- */
 
-/* True if nothing of the hull of points (in the scene's coordinates) can be seen. */
-static bool points_hidden(umb_region *r, const double (*points)[3], uint32_t count)
+/* Where something was found not to be hidden. */
+typedef struct opening {
+    uint32_t map, tile;
+} opening;
+
+/* True if nothing of the hull of points (in the scene's coordinates) can be seen. in_order: they are corners of an outline,
+ * as seen from above. */
+static bool points_hidden(umb_region *r, const double (*points)[3], uint32_t count, bool in_order, opening *open)
 {
     umb_ray_point p[UMB_RAY_POINTS];
     umb_ray_shape shape;
-    for (int k = 0; k < 4; ++k) {
+    for (uint32_t k = 0; k < 4; ++k) {
         const umb_ray_frame *f = &r->frames[k];
         for (uint32_t i = 0; i < count; ++i) {
             p[i] = umb_ray_frame_point(f, points[i]);
         }
-        if (!umb_ray_shape_make(f, p, count, &shape)) {
+        if (!umb_ray_shape_measure(f, p, count, &shape)) {
             continue;
         }
-        for (uint32_t m = (uint32_t)k; m < r->map_count; m += 4) {
-            if (!umb_ray_map_hides(&r->maps[m], r->kernels, &shape)) {
+        bool made = false;
+        for (open->map = k; open->map < r->map_count; open->map += 4) {
+            umb_ray_map *m = &r->maps[open->map];
+            if (!umb_ray_map_meets(m, &shape)) {
+                continue;
+            }
+            made = made || umb_ray_shape_outline(f, p, count, in_order, &shape);
+            if (made && !umb_ray_map_hides(m, r->kernels, &shape, &open->tile)) {
                 return false;
             }
         }
@@ -118,8 +130,21 @@ static bool points_hidden(umb_region *r, const double (*points)[3], uint32_t cou
     return true;
 }
 
+/* The same of the rays of one tile alone. */
+static bool points_hidden_at(umb_region *r, const double (*points)[3], uint32_t count, const opening *at)
+{
+    umb_ray_point p[UMB_RAY_POINTS];
+    umb_ray_shape shape;
+    const umb_ray_frame *f = &r->frames[at->map % 4];
+    for (uint32_t i = 0; i < count; ++i) {
+        p[i] = umb_ray_frame_point(f, points[i]);
+    }
+    return !umb_ray_shape_measure(f, p, count, &shape) || !umb_ray_shape_outline(f, p, count, false, &shape) ||
+           umb_ray_map_tile_hides(&r->maps[at->map], r->kernels, &shape, at->tile);
+}
+
 /* Four corners that have all the coordinates of a box. */
-static bool box_hidden(umb_region *r, const umb_aabb *box)
+static bool box_hidden(umb_region *r, const umb_aabb *box, opening *open)
 {
     uint32_t up = r->frames[0].axis_z, a = r->frames[0].axis_u, b = r->frames[0].axis_v;
     double p[4][3];
@@ -129,7 +154,7 @@ static bool box_hidden(umb_region *r, const umb_aabb *box)
         p[i][up] = (i & 1) != 0 ? box->min[up] : box->max[up];
     }
     r->answer.stats.queries += 1;
-    return points_hidden(r, (const double(*)[3])p, 4);
+    return points_hidden(r, (const double(*)[3])p, 4, true, open);
 }
 
 /* The box, in the world, of a part's box under a transform whose world vertices are rounded. */
@@ -153,10 +178,11 @@ static umb_aabb part_box(const umb_object *o, const umb_aabb *box)
 static bool parts_hidden(umb_region *r, const umb_object *o)
 {
     const umb_mesh *m = o->mesh;
+    opening open;
     for (uint32_t i = 0; i < m->part_count;) {
         const umb_part *part = &m->parts[i];
         umb_aabb box = o->identity ? part->box : part_box(o, &part->box);
-        if (box_hidden(r, &box)) {
+        if (box_hidden(r, &box, &open)) {
             i = part->skip;
         } else if (part->skip == i + 1) {
             return false;
@@ -169,10 +195,11 @@ static bool parts_hidden(umb_region *r, const umb_object *o)
 
 static bool object_hidden(umb_region *r, const umb_object *o)
 {
-    if (box_hidden(r, &o->bounds)) {
+    opening open;
+    if (box_hidden(r, &o->bounds, &open)) {
         return true;
     }
-    if (!o->refine) {
+    if (!o->refine || o->box) {
         return false;
     }
     const umb_mesh *m = o->mesh;
@@ -191,7 +218,9 @@ static bool object_hidden(umb_region *r, const umb_object *o)
             p[i][k] = w[k];
         }
     }
-    return points_hidden(r, (const double(*)[3])p, m->position_count);
+    const double(*points)[3] = (const double(*)[3])p;
+    return points_hidden_at(r, points, m->position_count, &open) &&
+           points_hidden(r, points, m->position_count, false, &open);
 }
 
 /* ---- blocking ------------------------------------------------------------------------------------ */
@@ -251,8 +280,6 @@ static void block_frame(umb_region *r, int k, const umb_piece *piece)
         memcpy(b.on_floor, on_floor, piece->count * sizeof *on_floor);
         b.count = piece->count;
         b.ring = piece->ring;
-        b.inner_edges = piece->edges;
-        b.inner_edge_count = piece->edge_count;
     }
     for (uint32_t m = (uint32_t)k; m < r->map_count && b.count >= 2; m += 4) {
         umb_ray_map_block(&r->maps[m], r->kernels, &b, r->query.half_umbra);
@@ -341,14 +368,15 @@ static umb_aabb node_box(const umb_node *n)
 static umb_result visit(umb_region *r, const umb_tree *tree, const umb_committed *c, uint64_t order)
 {
     uint32_t rank = (uint32_t)(order >> 30) & 3u, number = (uint32_t)order & UMB_REF_NUMBER;
+    opening open;
     if (rank == 0) {
         const umb_node *n = umb_tree_node(tree, number);
         umb_aabb box = node_box(n);
-        return box_hidden(r, &box) ? UMB_OK : push_children(r, n);
+        return box_hidden(r, &box, &open) ? UMB_OK : push_children(r, n);
     }
     if (rank == 1) {
         const umb_occluder *o = &c->occluders[number];
-        return box_hidden(r, &o->bounds) ? UMB_OK : block(r, o);
+        return box_hidden(r, &o->bounds, &open) ? UMB_OK : block(r, o);
     }
     const umb_object *o = &c->objects[number];
     if (object_hidden(r, o)) {

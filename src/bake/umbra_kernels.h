@@ -47,6 +47,7 @@ typedef struct umb_umbra {
     float z0, z1, ua, ub; /* the cell in every slice of these tiles */
     float error_u, error_z; /* of vertices, and of sums made with them */
     bool floor;           /* nothing passes below its bottom */
+    bool outlined;        /* depth and margin come from the edges and vertices of depth alone, which go around it */
 } umb_umbra;
 
 /* What all pixels of a tile, or of a group of tiles, have in common; in front: a pixel that no ray goes through

@@ -118,7 +118,9 @@ UMB_INLINE void corners_of_vector(const umb_umbra *o, bool half, umb_fv row, umb
         cross_top(o, &c, o->top[e].near_quotient != 0, half, &m, &far);
         s->top = umb_fv_min(s->top, umb_fv_select(c.here, m, none));
         s->top_far = umb_fv_min(s->top_far, umb_fv_select(c.here, far, none));
-        add_depth(o, &c, s);
+        if (!o->outlined) {
+            add_depth(o, &c, s);
+        }
     }
     for (uint32_t e = 0; e < o->bottom_count; ++e) {
         crossing c = cross(o, o->bottom[e], row, column);
@@ -131,7 +133,9 @@ UMB_INLINE void corners_of_vector(const umb_umbra *o, bool half, umb_fv row, umb
             s->bottom = umb_fv_max(s->bottom, umb_fv_select(c.here, M, -none));
             s->bottom_far = umb_fv_max(s->bottom_far, umb_fv_select(c.here, far, -none));
         }
-        add_depth(o, &c, s);
+        if (!o->outlined) {
+            add_depth(o, &c, s);
+        }
     }
     for (uint32_t e = 0; e < o->depth_count; ++e) {
         crossing c = cross(o, o->depth[e], row, column);
