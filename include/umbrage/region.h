@@ -33,7 +33,7 @@ typedef struct umb_region_query {
                               cells and single points are cells too */
     umb_region_up up;
     /* Pixels along each side of an occlusion map: 64 to 2048, rounded up to a multiple of 64; 0: 512. Maps by offset and slope
-       have a quarter as many along the offset (a multiple of 64 too): all but near things need fewer there. */
+       have an eighth as many along the offset (a multiple of 64 too): all but near things need fewer there. */
     uint32_t resolution;
     /* Intervals that are kept for each horizontal direction: 1 to 8; 0: 1 with half_umbra, else 2. */
     uint32_t umbrae;

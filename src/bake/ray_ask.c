@@ -10,16 +10,6 @@
 /* What is so thin for its distance has one range of u for all lines. */
 #define THIN 0x1p-6
 
-static inline double least(double a, double b)
-{
-    return a < b ? a : b;
-}
-
-static inline double most(double a, double b)
-{
-    return a > b ? a : b;
-}
-
 /* Cut an outline to u >= least. */
 static uint32_t cut(const umb_ray_point *p, uint32_t count, double least, umb_ray_point *out)
 {
@@ -42,12 +32,12 @@ bool umb_ray_shape_measure(const umb_ray_frame *f, const umb_ray_point *points, 
     double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
     for (uint32_t i = 0; i < count; ++i) {
         const umb_ray_point *p = &points[i];
-        low[0] = least(low[0], p->u);
-        low[1] = least(low[1], p->v);
-        low[2] = least(low[2], p->z);
-        high[0] = most(high[0], p->u);
-        high[1] = most(high[1], p->v);
-        high[2] = most(high[2], p->z);
+        low[0] = umb_least(low[0], p->u);
+        low[1] = umb_least(low[1], p->v);
+        low[2] = umb_least(low[2], p->z);
+        high[0] = umb_most(high[0], p->u);
+        high[1] = umb_most(high[1], p->v);
+        high[2] = umb_most(high[2], p->z);
     }
     out->u_min = low[0];
     out->u_max = high[0];
@@ -84,7 +74,7 @@ bool umb_ray_shape_outline(const umb_ray_frame *f, const umb_ray_point *points, 
 
 bool umb_ray_map_meets(const umb_ray_map *m, const umb_ray_shape *shape)
 {
-    double u = most(shape->u_max, m->frame->hu), error = m->frame->error;
+    double u = umb_most(shape->u_max, m->frame->hu), error = m->frame->error;
     double far = m->offset_most + m->slope_most * (u + error) + 2.0 * error;
     return shape->v_min <= far && shape->v_max >= -far;
 }
@@ -96,7 +86,7 @@ typedef struct beam {
 
 static double f_error(const umb_ray_map *m, const umb_ray_point *p, const beam *b)
 {
-    double s = most(fabs(b->s[0]), fabs(b->s[1])), t = most(fabs(b->t[0]), fabs(b->t[1]));
+    double s = umb_most(fabs(b->s[0]), fabs(b->s[1])), t = umb_most(fabs(b->t[0]), fabs(b->t[1]));
     double alpha = fabs(m->alpha0) + fabs(m->alpha1 * p->u), beta = fabs(m->beta0) + fabs(m->beta1 * p->u);
     double shift = m->frame->error * (1.0 + fabs(m->alpha1) * s + fabs(m->beta1) * t);
     return SLACK * (fabs(p->v) + alpha * s + beta * t) + shift;
@@ -121,8 +111,8 @@ static bool range_of_u(const umb_ray_map *m, const umb_ray_shape *shape, const b
         }
         low -= error[i];
         high += error[i];
-        f_least = least(f_least, low);
-        f_most = most(f_most, high);
+        f_least = umb_least(f_least, low);
+        f_most = umb_most(f_most, high);
         if (low <= 0.0 && high >= 0.0) {
             *u_min = p->u < *u_min ? p->u : *u_min;
             *u_max = p->u > *u_max ? p->u : *u_max;
@@ -147,8 +137,8 @@ static bool range_of_u(const umb_ray_map *m, const umb_ray_shape *shape, const b
             *u_max = at + off > *u_max ? at + off : *u_max;
         }
     }
-    *u_min = most(*u_min, shape->u_min) - m->frame->error;
-    *u_max = least(*u_max, shape->u_max) + m->frame->error;
+    *u_min = umb_most(*u_min, shape->u_min) - m->frame->error;
+    *u_max = umb_least(*u_max, shape->u_max) + m->frame->error;
     return true;
 }
 
@@ -218,8 +208,8 @@ static lanes range_of_lanes(const asked *q, double s0, double s1)
     }
     for (uint32_t i = 0; i < q->shape->count; ++i) {
         double a = q->places[i].at + s0 * q->places[i].slope, b = q->places[i].at + s1 * q->places[i].slope;
-        t_min = least(t_min, least(a, b));
-        t_max = most(t_max, most(a, b));
+        t_min = umb_least(t_min, umb_least(a, b));
+        t_max = umb_most(t_max, umb_most(a, b));
     }
     double from = (t_min - m->t0) * scale - 0x1p-16, to = (t_max - m->t0) * scale + 0x1p-16;
     if (!(from < n && to >= 0.0)) {
@@ -271,7 +261,7 @@ static uint64_t touched_pixels(const asked *a, uint32_t i, uint32_t j, umb_umbra
     for (uint32_t r = 0; r < UMB_TILE; ++r) {
         double s = m->s0 + (i * UMB_TILE + r) * m->ds;
         lanes l = range_of_lanes(a, s, s + m->ds);
-        double from = most(0.0, l.from - j * UMB_TILE), to = least(UMB_TILE - 1.0, l.to - j * UMB_TILE);
+        double from = umb_most(0.0, l.from - j * UMB_TILE), to = umb_least(UMB_TILE - 1.0, l.to - j * UMB_TILE);
         q->from[r] = (float)from;
         q->to[r] = (float)to;
         if (from <= to) {
@@ -332,7 +322,7 @@ static bool group_hides(const asked *a, uint32_t gi, uint32_t gj, uint32_t *tile
     for (uint32_t i = gi * UMB_TILE; i < (gi + 1) * UMB_TILE; ++i) {
         double s = m->s0 + i * UMB_TILE * m->ds;
         lanes l = range_of_lanes(a, s, s + UMB_TILE * m->ds);
-        double from = most(l.from / UMB_TILE, gj * UMB_TILE), to = least(l.to / UMB_TILE, (gj + 1) * UMB_TILE - 1.0);
+        double from = umb_most(l.from / UMB_TILE, gj * UMB_TILE), to = umb_least(l.to / UMB_TILE, (gj + 1) * UMB_TILE - 1.0);
         if (!(l.from <= l.to)) {
             continue;
         }

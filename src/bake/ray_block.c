@@ -39,14 +39,14 @@ void umb_ray_bound_vertex(const umb_ray_map *m, const umb_ray_point *p, float ua
     double qa1 = up > e ? (up - e) / (a + e) : (up - e) / (a - e), qb1 = up > e ? (up - e) / (b + e) : (up - e) / (b - e);
     double qa0 = rise > e ? (rise - e) / (a + e) : (rise - e) / (a - e);
     double qb0 = rise > e ? (rise - e) / (b + e) : (rise - e) / (b - e);
-    v->top = nextafterf((float)fmin(qa1, qb1), -INFINITY);
-    v->top_far = nextafterf((float)fmin(qa0, qb0), -INFINITY);
+    v->top = nextafterf((float)umb_least(qa1, qb1), -INFINITY);
+    v->top_far = nextafterf((float)umb_least(qa0, qb0), -INFINITY);
     qa1 = up < -e ? (up + e) / (a + e) : (up + e) / (a - e);
     qb1 = up < -e ? (up + e) / (b + e) : (up + e) / (b - e);
     qa0 = rise < -e ? (rise + e) / (a + e) : (rise + e) / (a - e);
     qb0 = rise < -e ? (rise + e) / (b + e) : (rise + e) / (b - e);
-    v->bottom = nextafterf((float)fmax(qa0, qb0), INFINITY);
-    v->bottom_far = nextafterf((float)fmax(qa1, qb1), INFINITY);
+    v->bottom = nextafterf((float)umb_most(qa0, qb0), INFINITY);
+    v->bottom_far = nextafterf((float)umb_most(qa1, qb1), INFINITY);
 }
 
 static uint8_t use_vertex(band *d, uint32_t i, uint32_t column, uint32_t columns)
@@ -142,10 +142,10 @@ static void make_umbra(band *d, uint32_t column, uint32_t columns, bool floor, c
     const umb_ray_blocker *b = d->blocker;
     const umb_ray_frame *f = d->map->frame;
     umb_umbra *o = &d->umbra;
-    double u = 0.0, z = fmax(fabs(f->z0), fabs(f->z1));
+    double u = 0.0, z = umb_most(fabs(f->z0), fabs(f->z1));
     for (uint32_t i = 0; i < b->count; ++i) {
-        u = fmax(u, fabs(b->vertices[i].u));
-        z = fmax(z, fabs(b->vertices[i].z));
+        u = umb_most(u, fabs(b->vertices[i].u));
+        z = umb_most(z, fabs(b->vertices[i].z));
         d->place[i] = -1;
     }
     d->used = 0;
@@ -155,7 +155,7 @@ static void make_umbra(band *d, uint32_t column, uint32_t columns, bool floor, c
     o->z1 = (float)f->z1;
     o->ua = span[0];
     o->ub = span[1];
-    o->error_u = (float)(0x1p-20 * fmax(u, f->hu) + 2.0 * f->error);
+    o->error_u = (float)(0x1p-20 * umb_most(u, f->hu) + 2.0 * f->error);
     o->error_z = (float)(0x1p-20 * z + 2.0 * f->error);
     o->floor = floor;
     o->top_count = use_chain(d, d->chains.top, d->chains.top_count, column, columns, true, o->top, &o->top_inner);
@@ -263,10 +263,10 @@ static bool range_of_tiles(const band *d, uint32_t *from, uint32_t *to)
             return true;
         }
         double a = (p->v - alpha * d->s) / beta, b = (p->v - alpha * (d->s + UMB_TILE * m->ds)) / beta;
-        least = fmin(least, fmin(a, b));
-        most = fmax(most, fmax(a, b));
+        least = umb_least(least, umb_least(a, b));
+        most = umb_most(most, umb_most(a, b));
     }
-    double first = fmax(0.0, floor((least - m->t0) / width)), last = fmin(m->columns - 1.0, floor((most - m->t0) / width));
+    double first = umb_most(0.0, floor((least - m->t0) / width)), last = umb_least(m->columns - 1.0, floor((most - m->t0) / width));
     if (!(first <= last)) {
         return false;
     }

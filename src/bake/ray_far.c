@@ -46,10 +46,10 @@ static void bounds_over(const umb_ray_map *m, const umb_ray_blocker *b, const um
     }
     double deepest = 0.0;
     for (uint32_t i = 0; i < b->count; ++i) {
-        deepest = fmax(deepest, b->vertices[i].u);
+        deepest = umb_most(deepest, b->vertices[i].u);
     }
     s->depth = nextafterf((float)(deepest + f->error), INFINITY);
-    *loss = fmax((double)top_most - s->top, floor ? 0.0 : (double)s->bottom - bottom_least);
+    *loss = umb_most((double)top_most - s->top, floor ? 0.0 : (double)s->bottom - bottom_least);
 }
 
 static place place_of(const umb_ray_map *m, const umb_ray_point *p)
@@ -68,11 +68,11 @@ static bool cover_row(drawing *d, uint32_t row, uint32_t *first, uint32_t *last)
     for (uint32_t r = 0; r < UMB_TILE; ++r) {
         double s0 = m->s0 + (row * UMB_TILE + r) * m->ds, s1 = s0 + m->ds, low = -INFINITY, high = INFINITY;
         for (int k = 0; k < 2; ++k) {
-            low = fmax(low, d->low[k].at + fmax(s0 * d->low[k].slope, s1 * d->low[k].slope));
-            high = fmin(high, d->high[k].at + fmin(s0 * d->high[k].slope, s1 * d->high[k].slope));
+            low = umb_most(low, d->low[k].at + umb_most(s0 * d->low[k].slope, s1 * d->low[k].slope));
+            high = umb_least(high, d->high[k].at + umb_least(s0 * d->high[k].slope, s1 * d->high[k].slope));
         }
-        double from = fmax(0.0, ceil((low - m->t0) * scale + PIXEL_SLACK));
-        double to = fmin(n, floor((high - m->t0) * scale - PIXEL_SLACK)) - 1.0;
+        double from = umb_most(0.0, ceil((low - m->t0) * scale + PIXEL_SLACK));
+        double to = umb_least(n, floor((high - m->t0) * scale - PIXEL_SLACK)) - 1.0;
         bool some = from <= to;
         d->from[r] = some ? (uint32_t)from : 1;
         d->to[r] = some ? (uint32_t)to : 0;
@@ -108,7 +108,7 @@ static bool find_chains(const umb_ray_map *m, const umb_ray_blocker *b, umb_ray_
 {
     double least = INFINITY, t0 = INFINITY, t1 = -INFINITY, s = m->s0 + 0.5 * m->rows * UMB_TILE * m->ds;
     for (uint32_t i = 0; i < b->count; ++i) {
-        least = fmin(least, b->vertices[i].u);
+        least = umb_least(least, b->vertices[i].u);
     }
     if (!(least > FAR * (m->frame->hu + m->frame->hv))) {
         return false;
@@ -119,8 +119,8 @@ static bool find_chains(const umb_ray_map *m, const umb_ray_blocker *b, umb_ray_
     }
     for (uint32_t i = 0; i < b->ring; ++i) {
         place p = place_of(m, &b->vertices[i]);
-        t0 = fmin(t0, p.at + s * p.slope);
-        t1 = fmax(t1, p.at + s * p.slope);
+        t0 = umb_least(t0, p.at + s * p.slope);
+        t1 = umb_most(t1, p.at + s * p.slope);
     }
     umb_ray_chains_ring(m, b, s, t0, t1, c);
     return true;

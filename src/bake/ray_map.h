@@ -11,6 +11,17 @@
 #include "base/memory.h"
 #include "umbra_kernels.h"
 
+/* Of two numbers, neither of them NAN: the library's are calls. */
+static inline double umb_least(double a, double b)
+{
+    return a < b ? a : b;
+}
+
+static inline double umb_most(double a, double b)
+{
+    return a > b ? a : b;
+}
+
 /* A view cell as a frame sees it. */
 typedef struct umb_ray_frame {
     double hu, hv, z0, z1;
@@ -41,7 +52,7 @@ typedef struct umb_ray_map {
 
 typedef enum umb_ray_kind { UMB_RAY_SLAB, UMB_RAY_NEAR, UMB_RAY_FAR } umb_ray_kind;
 
-/* Lay out and empty a map. outer: of the squares. Squares have resolution x resolution pixels, slabs a quarter as many along
+/* Lay out and empty a map. outer: of the squares. Squares have resolution x resolution pixels, slabs an eighth as many along
  * the offset, of which far things need less than of the slope. UMB_ERROR_MEMORY leaves nothing behind. A map that was set up before
  * with the same sizes keeps its memory. */
 umb_result umb_ray_map_begin(umb_ray_map *map, const umb_allocator *a, const umb_ray_frame *frame,

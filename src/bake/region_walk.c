@@ -72,8 +72,8 @@ static void set_frames(umb_region *r)
         for (int i = 0; i < 3; ++i) {
             f->centre[i] = 0.5 * (q->min[i] + q->max[i]);
         }
-        f->hu = fmax(q->max[f->axis_u] - f->centre[f->axis_u], f->centre[f->axis_u] - q->min[f->axis_u]) + error;
-        f->hv = fmax(q->max[f->axis_v] - f->centre[f->axis_v], f->centre[f->axis_v] - q->min[f->axis_v]) + error;
+        f->hu = umb_most(q->max[f->axis_u] - f->centre[f->axis_u], f->centre[f->axis_u] - q->min[f->axis_u]) + error;
+        f->hv = umb_most(q->max[f->axis_v] - f->centre[f->axis_v], f->centre[f->axis_v] - q->min[f->axis_v]) + error;
         f->z0 = q->min[up] - f->centre[up] - error;
         f->z1 = q->max[up] - f->centre[up] + error;
     }
@@ -240,7 +240,7 @@ static void cut_convex(const umb_region *r, const umb_ray_frame *f, const umb_pi
 {
     double most = f->hu;
     for (uint32_t i = 0; i < piece->count; ++i) {
-        most = fmax(most, fabs(p[i].u));
+        most = umb_most(most, fabs(p[i].u));
     }
     double least = f->hu * (1.0 + 0x1p-16) + 0x1p-14 * most;
     for (uint32_t i = 0; i < piece->count; ++i) {
@@ -268,7 +268,7 @@ static void block_frame(umb_region *r, int k, const umb_piece *piece)
     for (uint32_t i = 0; i < piece->count; ++i) {
         p[i] = umb_ray_frame_point(f, piece->points[i]);
         on_floor[i] = piece->points[i][f->axis_z] <= r->floor;
-        most = fmax(most, p[i].u);
+        most = umb_most(most, p[i].u);
     }
     if (!(most > f->hu)) {
         return;
@@ -300,7 +300,7 @@ static double gap_squared(const umb_region_query *q, const umb_aabb *b)
 {
     double sum = 0.0;
     for (int k = 0; k < 3; ++k) {
-        double gap = fmax(0.0, fmax(q->min[k] - b->max[k], b->min[k] - q->max[k]));
+        double gap = umb_most(0.0, umb_most(q->min[k] - b->max[k], b->min[k] - q->max[k]));
         sum += gap * gap;
     }
     return sum;
@@ -329,7 +329,7 @@ static float gap_of(const umb_region *r, const umb_aabb *b)
     double gap = 0.0;
     for (int i = 0; i < 2; ++i) {
         uint32_t k = i == 0 ? r->frames[0].axis_u : r->frames[0].axis_v;
-        gap = fmax(gap, fmax(r->query.min[k] - b->max[k], b->min[k] - r->query.max[k]));
+        gap = umb_most(gap, umb_most(r->query.min[k] - b->max[k], b->min[k] - r->query.max[k]));
     }
     return (float)gap;
 }
@@ -404,7 +404,7 @@ umb_result umb_region_walk(umb_region *r)
     const umb_committed *c = umb_scene_committed(umb_index_scene(r->index));
     set_frames(r);
     uint32_t up = r->frames[0].axis_z;
-    r->floor = fmin(r->query.min[up], tree->node_count > 0 ? tree->bounds.min[up] : r->query.min[up]);
+    r->floor = umb_least(r->query.min[up], tree->node_count > 0 ? tree->bounds.min[up] : r->query.min[up]);
     r->pieces.corners = (const double(*)[3])r->corners;
     r->pieces.reach = r->reach;
     r->pieces.emit = block_piece;
