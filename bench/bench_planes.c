@@ -1,12 +1,16 @@
-/* The planes method beside the experiments of its paper, as one page in Markdown: docs/results/planes.md.
+/* The planes method beside the experiments of its paper, as tables in Markdown; scripts/planes-report makes
+ * docs/results/planes.md of them.
  *
- *     bench_planes [ROUNDS [table]]     table: the last part alone
+ *     bench_planes ROUNDS PART [SCENE]
  *
- * 1. the experiments of Coorg and Teller (1997): what is left to draw, nodes and tests, and the time to ask with
- *    planes kept at nodes and without, at multiples of walking speed
- * 2. tangent corners by table and by search
+ *     left      what is left to draw, nodes and tests (Coorg and Teller 1997)
+ *     speeds    the time to ask at multiples of walking speed, with planes kept at nodes and without, with occluders searched for
+ *               and from lists
+ *     table     tangent corners by table and by search
+ *     commits   frames of a large scene in which things move
  *
- * Times are processor time: the least of the rounds for each frame, then the mean over the frames.
+ * SCENE: building or sodacity. Times are processor time: the least of the rounds for each frame, then the mean over the
+ * frames.
  */
 #include <math.h>
 #include <stdio.h>
@@ -74,22 +78,6 @@ static umb_view view_at(const place *p, const double eye[3], const double target
     return v;
 }
 
-static const char INTRO[] =
-    "# The planes method and its paper\n\n"
-    "What `build/bench/bench/bench_planes 3` prints (`UMB_BENCH=ON`); `bench/bench_planes.c` is the whole experiment. "
-    "Processor time of one thread in milliseconds, for each frame the least of the rounds, then the mean; the machine "
-    "was shared, so compare within a table. All other figures are the same in every run. Scenes: `gen:building`, and "
-    "`gen:sodacity`, three by three of such buildings; 60 degrees. A walk is 240 frames from eye to eye of the scene's "
-    "path, through walls too, looking ahead.\n\n"
-    "- *What is left*: triangles of what is in the frustum, and of what the method reports with 64 occluders, of all "
-    "there are; nodes opened; of the 64 occluders those that a node is held against. The walk is at 16 times walking "
-    "speed.\n"
-    "- *Speeds*: multiples of 1.4 m/s, 60 frames a second. Planes through the eye are what the method does; the "
-    "paper's tangent planes are found by its table in each frame, or kept at the nodes (`UMB_COHERENCE_PLANES`; in "
-    "brackets the part that was there). Answers are the same by all three. The paper's own way pays beside its own "
-    "table, where nodes are few; it does not beside eight boxes at a time, which need no memory.\n"
-    "- *Table and search*: tangent corners of random edges and boxes.\n\n";
-
 /* ---- 1: Coorg and Teller's experiments --------------------------------------------------------- */
 
 /* Frame f of a walk through the first views of the path, which lie in one building or street: from one eye straight to
@@ -123,15 +111,23 @@ static uint64_t triangles_of(const place *p, const umb_visible_set *seen)
     return sum;
 }
 
-static void print_left(const place *p)
+/* A culler with what it makes ahead. */
+static umb_culler *make_culler(const place *p, umb_method method, uint32_t coherence)
+{
+    umb_culler_def def = {.method = method, .coherence = coherence};
+    umb_culler *culler;
+    if (umb_culler_create(p->index, &def, &culler) != UMB_OK || umb_culler_prepare(culler) != UMB_OK) {
+        abort();
+    }
+    return culler;
+}
+
+static void print_left(const place *p, const char *name, uint32_t coherence)
 {
     umb_culler *cullers[2];
     uint64_t left[2] = {0, 0}, nodes = 0, tests = 0;
     for (int k = 0; k < 2; ++k) {
-        umb_culler_def def = {.method = k == 0 ? UMB_METHOD_NONE : UMB_METHOD_PLANES};
-        if (umb_culler_create(p->index, &def, &cullers[k]) != UMB_OK) {
-            abort();
-        }
+        cullers[k] = make_culler(p, k == 0 ? UMB_METHOD_NONE : UMB_METHOD_PLANES, k == 0 ? 0 : coherence);
         for (uint32_t f = 0; f < FRAMES; ++f) {
             umb_view v = walk_view(p, f * 16 * 1.4 / 60.0);
             umb_visible_set seen;
@@ -145,23 +141,19 @@ static void print_left(const place *p)
         umb_culler_destroy(cullers[k]);
     }
     double all = (double)p->m->triangles * FRAMES;
-    printf("| %s | %llu | %.1f %% | %.1f %% | %.0f | %.1f | %.1f %% |\n", p->name, (unsigned long long)p->m->triangles,
+    printf("| %s | %s | %llu | %.1f %% | %.1f %% | %.0f | %.1f | %.1f %% |\n", p->name, name, (unsigned long long)p->m->triangles,
            100.0 * (double)left[0] / all, 100.0 * (double)left[1] / all, (double)nodes / FRAMES,
            (double)tests / (double)nodes, 100.0 * (double)tests / (double)nodes / 64.0);
     (void)fflush(stdout);
 }
 
 /* The time to ask at one speed; *kept becomes the part of the planes that was there. */
-static double time_walk(const place *p, umb_planes_way way, uint32_t speed, uint32_t rounds, double *kept)
+static double time_walk(const place *p, umb_planes_way way, uint32_t coherence, uint32_t speed, uint32_t rounds, double *kept)
 {
     static double least[FRAMES];
     double sum = 0.0;
     for (uint32_t r = 0; r < rounds; ++r) {
-        umb_culler_def def = {.method = UMB_METHOD_PLANES};
-        umb_culler *culler;
-        if (umb_culler_create(p->index, &def, &culler) != UMB_OK) {
-            abort();
-        }
+        umb_culler *culler = make_culler(p, UMB_METHOD_PLANES, coherence);
         void *state = umb_culler_method_state(culler);
         umb_planes_go(state, way);
         for (uint32_t f = 0; f < FRAMES; ++f) {
@@ -190,13 +182,15 @@ static void print_speeds(const place *p, uint32_t rounds)
     static const struct {
         const char *name;
         umb_planes_way way;
-    } ways[3] = {{"planes through the eye, by eights", UMB_PLANES_DIRECT},
-                 {"tangent planes by table", UMB_PLANES_TABLE},
-                 {"tangent planes by table, kept", UMB_PLANES_CACHED}};
-    for (int w = 0; w < 3; ++w) {
+        uint32_t coherence;
+    } ways[4] = {{"planes through the eye, by eights", UMB_PLANES_DIRECT, 0},
+                 {"the same, occluders of leaves", UMB_PLANES_DIRECT, UMB_COHERENCE_LEAVES},
+                 {"tangent planes by table", UMB_PLANES_TABLE, 0},
+                 {"tangent planes by table, kept", UMB_PLANES_CACHED, 0}};
+    for (int w = 0; w < 4; ++w) {
         printf("| %s | %s |", p->name, ways[w].name);
         for (uint32_t speed = 1; speed <= 16; speed *= 2) {
-            double kept, ms = time_walk(p, ways[w].way, speed, rounds, &kept);
+            double kept = 0.0, ms = time_walk(p, ways[w].way, ways[w].coherence, speed, rounds, &kept);
             if (ways[w].way == UMB_PLANES_CACHED) {
                 printf(" %.3f (%.0f %%) |", ms, 100.0 * kept);
             } else {
@@ -253,35 +247,101 @@ static void print_table(uint32_t rounds)
            best[1] * 1e6 / PAIRS, best[0] / best[1]);
 }
 
-int main(int argc, char **argv)
+/* ---- 3: commits --------------------------------------------------------------------------------- */
+
+enum { MOVED = 1000, COMMIT_FRAMES = 60 };
+
+static void move_some(const place *p, uint32_t frame, uint32_t count)
 {
-    uint32_t rounds = argc > 1 ? (uint32_t)strtoul(argv[1], NULL, 10) : 5;
-    place places[2] = {{.name = "building", .spec = "gen:building"},
-                       {.name = "soda city", .spec = "gen:sodacity"}};
-    if (rounds == 0 || rounds > MOST_ROUNDS) {
-        (void)fprintf(stderr, "usage: bench_planes [ROUNDS [table]], from 1 to %d\n", MOST_ROUNDS);
-        return 2;
-    }
-    if (argc > 2) {
-        print_table(rounds);
-        return 0;
-    }
-    for (int i = 0; i < 2; ++i) {
-        if (!open_place(&places[i])) {
-            return 1;
+    for (uint32_t i = 0; i < count; ++i) {
+        uint32_t object = (uint32_t)((uint64_t)(i * 977 + frame) * 2654435761u % p->m->object_count);
+        umb_transform t = p->m->objects[object].transform;
+        t.m[0][3] += frame % 2 == 0 ? 0.25f : 0.0f;
+        if (umb_scene_move_object(p->scene, object, &t, NULL) != UMB_OK) {
+            abort();
         }
     }
-    printf("%s## What is left, and what is asked\n\n| scene | triangles | after the frustum | after occlusion | nodes a "
-           "frame | occluders a node | of 64 |\n|---|---|---|---|---|---|---|\n", INTRO);
-    print_left(&places[0]);
-    print_left(&places[1]);
-    printf("\n## Speeds\n\n| scene | planes | 1x | 2x | 4x | 8x | 16x |\n|---|---|---|---|---|---|---|\n");
-    print_speeds(&places[0], rounds);
-    print_speeds(&places[1], rounds);
-    printf("\n## Table and search\n\n");
-    print_table(rounds);
+    if (umb_scene_commit(p->scene) != UMB_OK) {
+        abort();
+    }
+}
+
+/* Frames after so many commits each; the milliseconds of the frame alone. */
+static double time_commits(const place *p, uint32_t commits, uint32_t rounds)
+{
+    static double least[COMMIT_FRAMES];
+    double sum = 0.0;
+    umb_culler *culler = make_culler(p, UMB_METHOD_PLANES, 0);
+    for (uint32_t r = 0; r < rounds; ++r) {
+        for (uint32_t f = 0; f < COMMIT_FRAMES; ++f) {
+            umb_view v = view_at(p, p->path.rows[f % p->path.count], p->path.rows[f % p->path.count] + 3);
+            umb_visible_set seen;
+            for (uint32_t k = 0; k < commits; ++k) {
+                move_some(p, f + k, k == 0 ? MOVED : 1);
+            }
+            double start = now_ms();
+            if (umb_cull(culler, &v, &seen) != UMB_OK) {
+                abort();
+            }
+            double ms = now_ms() - start;
+            least[f] = r == 0 || ms < least[f] ? ms : least[f];
+        }
+    }
+    for (uint32_t f = 1; f < COMMIT_FRAMES; ++f) {
+        sum += least[f] / (COMMIT_FRAMES - 1);
+    }
+    umb_culler_destroy(culler);
+    return sum;
+}
+
+static void print_commits(uint32_t rounds)
+{
+    static const char *const names[3] = {"nothing moves", "a commit that moves 1,000 objects", "the same and another commit"};
+    place p = {.name = "blocks-100", .spec = "gen:blocks,g=100"};
+    if (!open_place(&p)) {
+        exit(1);
+    }
+    printf("| %s, %u objects: before each frame | ms a frame |\n|---|---|\n", p.name, p.m->object_count);
+    for (uint32_t commits = 0; commits < 3; ++commits) {
+        printf("| %s | %.3f |\n", names[commits], time_commits(&p, commits, rounds));
+    }
+    close_place(&p);
+}
+
+static void print_scenes(const char *part, const char *only, uint32_t rounds)
+{
+    place places[2] = {{.name = "building", .spec = "gen:building"}, {.name = "sodacity", .spec = "gen:sodacity"}};
     for (int i = 0; i < 2; ++i) {
+        if (only != NULL && strcmp(only, places[i].name) != 0) {
+            continue;
+        }
+        if (!open_place(&places[i])) {
+            exit(1);
+        }
+        if (strcmp(part, "left") == 0) {
+            print_left(&places[i], "searched for", 0);
+            print_left(&places[i], "of leaves", UMB_COHERENCE_LEAVES);
+        } else {
+            print_speeds(&places[i], rounds);
+        }
         close_place(&places[i]);
+    }
+}
+
+int main(int argc, char **argv)
+{
+    uint32_t rounds = argc > 2 ? (uint32_t)strtoul(argv[1], NULL, 10) : 0;
+    const char *part = argc > 2 ? argv[2] : "", *only = argc > 3 ? argv[3] : NULL;
+    if (rounds == 0 || rounds > MOST_ROUNDS) {
+        (void)fprintf(stderr, "usage: bench_planes ROUNDS left|speeds|table|commits [SCENE], from 1 to %d rounds\n", MOST_ROUNDS);
+        return 2;
+    }
+    if (strcmp(part, "table") == 0) {
+        print_table(rounds);
+    } else if (strcmp(part, "commits") == 0) {
+        print_commits(rounds);
+    } else {
+        print_scenes(part, only, rounds);
     }
     return 0;
 }

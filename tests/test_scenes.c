@@ -18,7 +18,7 @@
 #define MAX_RASTERS 3
 
 /* Methods without a raster, which answer beside those of each raster size. */
-static const umb_method OBJECT_SPACE[] = {UMB_METHOD_SHADOW_FRUSTA, UMB_METHOD_OCCLUSION_TREE};
+static const umb_method OBJECT_SPACE[] = {UMB_METHOD_PLANES, UMB_METHOD_SHADOW_FRUSTA, UMB_METHOD_OCCLUSION_TREE};
 enum { OBJECT_SPACE_COUNT = sizeof OBJECT_SPACE / sizeof OBJECT_SPACE[0], MAX_ANSWERS = MAX_RASTERS + OBJECT_SPACE_COUNT };
 
 /* How much is looked at. */
