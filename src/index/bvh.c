@@ -430,6 +430,14 @@ static inline __attribute__((always_inline)) void fetch(const umb_node *nodes, u
     }
 }
 
+/* Trees of so many nodes or less are in the caches, where asking ahead costs more than it saves. */
+#define IN_CACHES 4096u
+
+static inline bool is_large(const umb_bvh_marks *marks)
+{
+    return marks->node_words > IN_CACHES / 64 + 1;
+}
+
 /* Bring a marked node's box up to its parent, which is marked when that changes it. By bits, so
  * that the result is that of a full refit to the sign of a zero. */
 static inline void lift(umb_node *nodes, const umb_bvh_marks *marks, umb_node_volumes *volumes, uint32_t number)
@@ -452,7 +460,9 @@ static inline void lift(umb_node *nodes, const umb_bvh_marks *marks, umb_node_vo
     }
     if (changed != 0 || refitted) {
         umb_bvh_mark(marks, node->parent);
-        fetch(nodes, parent->parent); /* its turn is later */
+        if (is_large(marks)) {
+            fetch(nodes, parent->parent); /* its turn is later */
+        }
     }
 }
 
@@ -478,13 +488,14 @@ void umb_bvh_lift_marked(umb_node *nodes, const umb_bvh_marks *marks, umb_node_v
 void umb_bvh_refit_moved(umb_node *nodes, umb_bvh_marks *marks, const uint32_t *places,
                          const umb_committed *scene, umb_node_volumes *volumes)
 {
+    bool large = is_large(marks);
     for (uint32_t i = 0; i < scene->moved_count; ++i) {
         uint32_t place = places[scene->moved[i]];
-        if (i + 2 * AHEAD < scene->moved_count) {
+        if (large && i + 2 * AHEAD < scene->moved_count) {
             __builtin_prefetch(&places[scene->moved[i + 2 * AHEAD]]);
             __builtin_prefetch(&scene->objects[scene->moved[i + 2 * AHEAD]].bounds);
         }
-        if (i + AHEAD < scene->moved_count) {
+        if (large && i + AHEAD < scene->moved_count) {
             uint32_t next = places[scene->moved[i + AHEAD]];
             fetch(nodes, next != UMB_NONE ? next / UMB_NODE_WIDTH : 0);
         }
@@ -494,7 +505,9 @@ void umb_bvh_refit_moved(umb_node *nodes, umb_bvh_marks *marks, const uint32_t *
             uint32_t slot = place % UMB_NODE_WIDTH;
             set_slot(node, slot, box->min, box->max, node->ref[slot]);
             umb_bvh_mark(marks, place / UMB_NODE_WIDTH);
-            fetch(nodes, node->parent);
+            if (large) {
+                fetch(nodes, node->parent);
+            }
         }
     }
     umb_bvh_lift_marked(nodes, marks, volumes);

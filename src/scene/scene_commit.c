@@ -239,8 +239,9 @@ static umb_result commit_structure(umb_scene *scene)
     return UMB_OK;
 }
 
-/* How many moves ahead memory is asked for. */
+/* How many moves ahead memory is asked for; of so few objects all is in the caches. */
 #define AHEAD 8
+#define IN_CACHES 8192u
 
 /* Inline: GCC finds that the function has no effect, and drops calls to it. */
 static inline __attribute__((always_inline)) void fetch(const umb_scene *scene, uint32_t i)
@@ -269,8 +270,11 @@ static inline __attribute__((always_inline)) void fetch(const umb_scene *scene, 
 static void commit_moved(umb_scene *scene)
 {
     uint32_t count = 0;
+    bool large = scene->object_ids.used > IN_CACHES;
     for (uint32_t i = 0; i < scene->touched_count; ++i) {
-        fetch(scene, i);
+        if (large) {
+            fetch(scene, i);
+        }
         umb_object_slot *slot = &scene->objects[scene->touched[i]];
         const umb_placement *p = &slot->placement;
         umb_object *object = &scene->committed_objects[scene->touched[i]];
