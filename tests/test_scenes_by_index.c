@@ -21,13 +21,13 @@ enum { MOST = 64 };
 
 typedef struct effort {
     uint32_t walk_step, nasty_step;
-    uint32_t most_triangles; /* of scenes for BSP trees, which hold each triangle */
+    uint32_t most_triangles; /* of scenes for BSP trees, which hold each triangle: a million take minutes to build */
     truth_options oracle;
 } effort;
 
 static const effort SMALL = {479, 19, 30000, {.grid_width = 96, .grid_height = 48, .guided_rays = 10000}};
 static const effort NORMAL = {160, 10, 100000, {.grid_width = 192, .grid_height = 96, .guided_rays = 40000}};
-static const effort FULL = {8, 1, 1u << 30, {.grid_width = 384, .grid_height = 192, .guided_rays = 250000}};
+static const effort FULL = {8, 1, 200000, {.grid_width = 384, .grid_height = 192, .guided_rays = 250000}};
 
 static uint32_t part, parts = 1;
 static const char *only = "";
