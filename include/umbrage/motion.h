@@ -19,7 +19,8 @@
  *     }
  *
  * How long a volume holds is adapted to each object: one that expires unseen is followed by one for twice as long; one
- * that is seen while its object is hidden, at once by one for half as long. An object that was itself reported since the last
+ * that is seen while its object is hidden, at once by one for half as long, and so is one that is hidden, but so large that culls
+ * come upon it again and again. An object that was itself reported since the last
  * commit is put where it is by each commit, as if it were moved by hand, until it no longer is.
  */
 #ifndef UMBRAGE_MOTION_H
@@ -52,7 +53,9 @@ typedef struct umb_pose_source {
 
 typedef enum umb_motion_kind {
     UMB_MOTION_SPEED = 0, /* its volume grows from where it was last known to be, by what is said of its speed */
-    UMB_MOTION_VOLUME = 1 /* it never leaves def.volume: a door, a lift, a train on its rails. Never expires */
+    /* It never leaves def.volume: a door, a lift, a train on its rails. That never expires. If something is promised of its
+       speed or spin too, volumes as above take its place while it is seen and the object is not. */
+    UMB_MOTION_VOLUME = 1
 } umb_motion_kind;
 
 /* What is promised of an object, whatever happens to it until its motion is set anew. */
@@ -62,7 +65,7 @@ typedef struct umb_motion_def {
        within max_speed s + max_acceleration s^2 / 2 of where that pose's velocity takes it; the object is turned by
        at most max_spin s radians away from where its spin takes it. All of them 0 or more; INFINITY: unknown (a
        sphere around the pivot then holds it however it turns). What changes its form keeps to bounds about the pivot
-       if max_speed is that of its fastest point and max_spin is 0. */
+       if max_speed is that of its fastest point and max_spin is 0. UMB_MOTION_VOLUME: all of them 0: unknown. */
     double max_speed, max_acceleration, max_spin;
     double pivot[3];  /* in the shape's coordinates */
     umb_aabb volume;  /* VOLUME: the volume. SPEED: a volume that it does not leave either; all zero: none */
@@ -96,6 +99,7 @@ typedef struct umb_motion_stats {
     uint32_t renewed;  /* volumes made by the last commit */
     uint32_t expired;  /* of these: because the one before had expired */
     uint32_t revealed; /* of these: because the one before was seen and its object was not */
+    uint32_t costly;   /* of these: because the one before was hidden and often tested */
     uint32_t asked;    /* poses that the last commit asked for */
     double period;     /* mean of the periods of all volumes that expire, in seconds */
 } umb_motion_stats;

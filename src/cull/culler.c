@@ -215,6 +215,9 @@ static void count_hidden(walk *w, uint32_t ref)
     uint32_t kind = ref & UMB_REF_KIND;
     w->stats.hidden_nodes += kind == UMB_REF_NODE;
     w->stats.hidden_objects += kind == UMB_REF_OBJECT;
+    if (kind == UMB_REF_OBJECT && w->scene->motion.count > 0) {
+        umb_movers_pass(&w->culler->movers, ref & UMB_REF_NUMBER);
+    }
 }
 
 /* An object in parts is as large as all of it, and a node of parts says nothing. */

@@ -13,9 +13,9 @@
 static umb_testimony tell(void *user, bool forget)
 {
     umb_movers *m = user;
-    umb_testimony t = {m->posed, m->shown, m->posed_count, m->shown_count};
+    umb_testimony t = {m->posed, m->shown, m->tested, m->posed_count, m->shown_count, m->tested_count};
     if (forget) {
-        m->posed_count = m->shown_count = 0;
+        m->posed_count = m->shown_count = m->tested_count = 0;
         m->commit += 1;
     }
     return t;
@@ -36,6 +36,7 @@ void umb_movers_end(umb_movers *m, umb_scene *scene, const umb_allocator *a)
     umb_memory_free(a, m->posed, m->posed_capacity * sizeof *m->posed);
     umb_memory_free(a, m->places, m->place_capacity * sizeof *m->places);
     umb_memory_free(a, m->shown, m->shown_capacity * sizeof *m->shown);
+    umb_memory_free(a, m->tested, m->tested_capacity * sizeof *m->tested);
     umb_memory_free(a, m->shown_in, m->shown_in_capacity * sizeof *m->shown_in);
 }
 
@@ -96,6 +97,7 @@ static bool reserve(umb_movers *m, const umb_allocator *a, const umb_committed *
         !umb_memory_reserve_none(a, &m->places, &m->place_capacity, numbers) ||
         !umb_memory_reserve(a, (void **)&m->shown, &m->shown_capacity, numbers, sizeof *m->shown) ||
         !umb_memory_reserve_zero(a, (void **)&m->shown_in, &m->shown_in_capacity, numbers, sizeof *m->shown_in) ||
+        !umb_memory_reserve(a, (void **)&m->tested, &m->tested_capacity, numbers, sizeof *m->tested) ||
         !umb_memory_reserve(a, (void **)&m->occluders, &m->occluder_capacity, occluders ? scene->occluder_count : 0,
                             sizeof *m->occluders)) {
         return false;

@@ -7,6 +7,9 @@
 #include "scene/scene.h"
 #include "umbrage/cull.h"
 
+/* Of hidden volumes that are tested so many are counted as one; each object has its own frames. */
+#define UMB_MOVERS_SAMPLE 16u
+
 typedef struct umb_movers {
     umb_committed scene; /* what this frame looks at; its occluders are the culler's own copy */
     umb_occluder *occluders;
@@ -14,8 +17,9 @@ typedef struct umb_movers {
     uint32_t *places;  /* per mover: where in posed it is, if it is; any number else */
     uint32_t *shown;   /* exact movers reported since the last commit, */
     uint64_t *shown_in; /* and for each mover the commit after which it was last put there, counted from 1 */
-    size_t occluder_capacity, posed_capacity, place_capacity, shown_capacity, shown_in_capacity;
-    uint32_t posed_count, shown_count;
+    uint32_t *tested;  /* volumes tested since the last commit, and hidden: one in UMB_MOVERS_SAMPLE */
+    size_t occluder_capacity, posed_capacity, place_capacity, shown_capacity, shown_in_capacity, tested_capacity;
+    uint32_t posed_count, shown_count, tested_count;
     uint32_t frame, met; /* the frame that is going on; how many movers were met in it */
     uint64_t version, structure; /* of the scene that occluders is a copy of; version 0: of none */
     uint64_t told_version;       /* that poses were told for */
@@ -63,6 +67,15 @@ static inline void umb_movers_show(umb_movers *m, uint32_t object)
     } else if (o->mover != UMB_NONE && m->shown_in[o->mover] != m->commit) {
         m->shown_in[o->mover] = m->commit;
         m->shown[m->shown_count++] = o->mover;
+    }
+}
+
+/* An object's box was tested, and is hidden. */
+static inline void umb_movers_pass(umb_movers *m, uint32_t object)
+{
+    if ((object + m->frame) % UMB_MOVERS_SAMPLE == 0 && m->tested_count < m->tested_capacity) {
+        m->tested[m->tested_count] = m->scene.objects[object].mover;
+        m->tested_count += m->scene.objects[object].mover != UMB_NONE;
     }
 }
 

@@ -2,12 +2,15 @@
 
 #include <string.h>
 
+#include "cut.h"
 #include "slot_choice.h"
 
 /* What one change costs, in items built: measured on trees of a thousand to a million boxes. */
 #define CHANGE_COST 6
 /* Subtrees of more items are not made anew within one commit. */
 #define MOST_RENEWED 4096
+/* A node that a new volume makes larger than so many times its size is not where it belongs. */
+#define MOST_GROWTH 2.0
 /* How many moves ahead nodes are asked for: all that is looked at before is in the caches. */
 #define AHEAD 8
 
@@ -137,9 +140,37 @@ static inline __attribute__((always_inline)) void fetch(const umb_tree_edit *e, 
     __builtin_prefetch(node->ref, 1);
 }
 
+/* True if a node grows little when one of its items has another box. */
+static bool fits(const umb_tree_edit *e, uint32_t place, const umb_aabb *box)
+{
+    const umb_node *node = &e->nodes[place / UMB_NODE_WIDTH];
+    umb_aabb whole = umb_node_bounds(node), with = whole;
+    for (int i = 0; i < 3; ++i) {
+        with.min[i] = box->min[i] < with.min[i] ? box->min[i] : with.min[i];
+        with.max[i] = box->max[i] > with.max[i] ? box->max[i] : with.max[i];
+    }
+    return umb_half_area(with.min, with.max) <= MOST_GROWTH * umb_half_area(whole.min, whole.max);
+}
+
+/* A volume made anew (motion.h) is where its object is going now, as far from the last one as both are long; it then stays
+ * for many frames. Where it is put decides how soon the tree is bad. */
+static void place_volumes(umb_tree_edit *e, const umb_committed *scene)
+{
+    for (uint32_t i = 0; i < scene->moved_count && !e->failed; ++i) {
+        uint32_t id = scene->moved[i];
+        const umb_object *o = &scene->objects[id];
+        if (o->mover != UMB_NONE && !o->exact && e->places[id] != UMB_NONE && !fits(e, e->places[id], &o->bounds)) {
+            move_below_ancestor(e, UMB_REF_OBJECT | id, &o->bounds);
+        }
+    }
+}
+
 static void move_all(umb_updater *u, umb_tree_edit *e, const umb_committed *scene)
 {
     bool refits = u->strategy == UMB_UPDATE_REFIT || u->strategy == UMB_UPDATE_INCREMENTAL;
+    if (u->strategy == UMB_UPDATE_INCREMENTAL && scene->motion.count > 0) {
+        place_volumes(e, scene);
+    }
     if (refits && e->next == NULL) {
         umb_bvh_refit_moved(e->nodes, &e->marks, e->places, scene, e->volumes);
         return;

@@ -4,6 +4,7 @@
  *     a new motion          umb_scene_set_motion()
  *     expiry                the queue, up to the scene's time
  *     seen, and not shown   what cullers were told since the last commit
+ *     hidden, but large     what cullers tested in vain since it was made
  *
  * What cullers were told is taken in too: a volume that was seen is followed by one that grows from the pose then told. */
 #include <float.h>
@@ -16,6 +17,10 @@
 #define FIRST_PERIOD 1.0
 #define LEAST_PERIOD 0.125
 #define MOST_PERIOD 64.0
+/* A hidden volume that was tested so often (each count stands for UMB_MOVERS_SAMPLE frames) has cost as much as a new one, which
+ * may be out of the walks' way because it is smaller. If it is not, it is asked of it half as often, and so on so many times. */
+#define MOST_TESTED 3
+#define MOST_VAIN 5
 
 /* ---- witnesses ------------------------------------------------------------------------------ */
 
@@ -232,13 +237,17 @@ static double stretch(uint32_t object, double period)
 static void adapt(umb_movers_state *m, umb_mover_slot *mover, const umb_motion_def *def)
 {
     double factor = 1.0;
-    if ((mover->why & UMB_DUE_REVEALED) != 0 || ((mover->why & UMB_DUE_EXPIRED) != 0 && mover->seen)) {
+    bool expired = (mover->why & UMB_DUE_EXPIRED) != 0, costly = (mover->why & UMB_DUE_COSTLY) != 0;
+    if (costly || (mover->why & UMB_DUE_REVEALED) != 0 || (expired && mover->seen)) {
         factor = 0.5;
-    } else if ((mover->why & UMB_DUE_EXPIRED) != 0) {
+    } else if (expired) {
         factor = 2.0;
     }
+    mover->vain = expired && mover->tested == 0 ? 0 : mover->vain;
+    mover->vain += costly && mover->vain < MOST_VAIN;
     m->stats.expired += (mover->why & UMB_DUE_EXPIRED) != 0;
     m->stats.revealed += (mover->why & UMB_DUE_REVEALED) != 0;
+    m->stats.costly += (mover->why & UMB_DUE_COSTLY) != 0;
     mover->period = fmin(fmax(mover->period * factor, def->least_period), def->most_period);
 }
 
@@ -271,10 +280,16 @@ static void settle(umb_scene *scene, uint32_t number)
 {
     umb_movers_state *m = &scene->moving;
     scene->objects[m->objects[number]].bounds = m->promises[number].def.volume;
-    m->slots[number].exact = false;
+    m->slots[number].exact = m->slots[number].seen = false;
     umb_expiries_set(&m->expiries, number, INFINITY);
     umb_scene_touch_object(scene, m->objects[number]);
     m->stats.renewed += 1;
+}
+
+/* True if volumes can be made that are smaller than the one given. */
+static bool grows(const umb_motion_def *def)
+{
+    return def->kind == UMB_MOTION_SPEED || def->max_speed > 0.0 || def->max_acceleration > 0.0 || def->max_spin > 0.0;
 }
 
 /* It was seen of late, and is likely to be seen again: as long as it is, it is put where it is at each commit, like
@@ -325,6 +340,15 @@ static void pin(umb_scene *scene, uint32_t number)
     umb_scene_touch_object(scene, object);
 }
 
+static bool is_box(const umb_aabb *a, const umb_aabb *b)
+{
+    bool same = true;
+    for (int i = 0; i < 3; ++i) {
+        same = same && a->min[i] == b->min[i] && a->max[i] == b->max[i];
+    }
+    return same;
+}
+
 /* Put its shape where it was last known to be, and in place of its bounds a volume. */
 static void renew(umb_scene *scene, uint32_t number)
 {
@@ -339,8 +363,9 @@ static void renew(umb_scene *scene, uint32_t number)
     const umb_pose *pose = &promise->known;
     const umb_aabb *bounds = mover->placed ? find_place(scene, object, pose, &seen) : NULL;
     mover->seen = mover->exact = false;
+    mover->tested = 0;
     if (bounds == NULL) {
-        lose(scene, number);
+        promise->def.kind == UMB_MOTION_VOLUME ? settle(scene, number) : lose(scene, number);
         return;
     }
     umb_scene_place(&slot->placement, &pose->transform, &seen);
@@ -349,6 +374,10 @@ static void renew(umb_scene *scene, uint32_t number)
     const umb_aabb *local = mesh != NULL && umb_box_is_zero(&pose->bounds) ? &mesh->bounds : NULL;
     umb_tbv_start from = {.local = local, .pose = pose, .bounds = bounds};
     slot->bounds = umb_tbv_swept(&promise->def, &from, nextafter(until - mover->known_at, INFINITY));
+    if (promise->def.kind == UMB_MOTION_VOLUME && is_box(&slot->bounds, &promise->def.volume)) {
+        settle(scene, number);
+        return;
+    }
     umb_expiries_set(&m->expiries, number, until);
     umb_scene_touch_object(scene, object);
     m->stats.renewed += 1;
@@ -358,9 +387,11 @@ static void renew(umb_scene *scene, uint32_t number)
 static void make_volume(umb_scene *scene, uint32_t number)
 {
     const umb_movers_state *m = &scene->moving;
+    const umb_motion_def *def = &m->promises[number].def;
+    bool fresh = (m->slots[number].why & UMB_DUE_FRESH) != 0;
     if (stays_exact(m, &m->slots[number])) {
         pin(scene, number);
-    } else if (m->promises[number].def.kind == UMB_MOTION_VOLUME) {
+    } else if (def->kind == UMB_MOTION_VOLUME && (fresh || !grows(def))) {
         settle(scene, number);
     } else {
         renew(scene, number);
@@ -404,6 +435,11 @@ static void hear(umb_movers_state *m, const umb_testimony *t)
             m->slots[t->shown[i]].shown = m->commit;
         }
     }
+    for (uint32_t i = 0; i < t->tested_count; ++i) {
+        if (t->tested[i] < m->ids.used && m->slots[t->tested[i]].tested < UINT8_MAX) {
+            m->slots[t->tested[i]].tested += 1;
+        }
+    }
     for (uint32_t i = 0; i < t->posed_count; ++i) {
         const umb_posed *told = &t->posed[i];
         if (!concerns(m, told)) {
@@ -420,19 +456,32 @@ static void hear(umb_movers_state *m, const umb_testimony *t)
     }
 }
 
+/* True if a new volume would be smaller, and that is wanted. */
+static bool is_large(const umb_movers_state *m, uint32_t mover)
+{
+    const umb_motion_def *def = &m->promises[mover].def;
+    return m->slots[mover].period > def->least_period && grows(def);
+}
+
 /* What follows from it, when all have been heard. */
 static void conclude(umb_movers_state *m, const umb_testimony *t)
 {
+    for (uint32_t i = 0; i < t->tested_count; ++i) {
+        uint32_t mover = t->tested[i];
+        if (mover < m->ids.used && m->objects[mover] != UMB_NONE && !m->slots[mover].exact &&
+            m->slots[mover].tested >= MOST_TESTED << m->slots[mover].vain && is_large(m, mover)) {
+            make_due(m, mover, UMB_DUE_COSTLY);
+        }
+    }
     for (uint32_t i = 0; i < t->posed_count; ++i) {
         const umb_posed *told = &t->posed[i];
         if (!concerns(m, told)) {
             continue;
         }
         const umb_mover_slot *mover = &m->slots[told->mover];
-        const umb_motion_def *def = &m->promises[told->mover].def;
         if (mover->shown == m->commit) {
             make_due(m, told->mover, UMB_DUE_SHOWN);
-        } else if (!told->expired && mover->period > def->least_period && def->kind == UMB_MOTION_SPEED) {
+        } else if (!told->expired && is_large(m, told->mover)) {
             make_due(m, told->mover, UMB_DUE_REVEALED);
         }
     }

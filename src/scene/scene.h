@@ -59,7 +59,8 @@ typedef struct umb_committed {
 typedef struct umb_testimony {
     const umb_posed *posed;  /* movers that it asked for */
     const uint32_t *shown;   /* numbers of exact ones that it reported */
-    uint32_t posed_count, shown_count;
+    const uint32_t *tested;  /* numbers of those whose volumes it tested, and they were hidden: a part of these, each time */
+    uint32_t posed_count, shown_count, tested_count;
 } umb_testimony;
 
 /* Cullers register to be asked at each commit what they saw of moving objects. It is theirs, and forgotten when forget is

@@ -66,6 +66,8 @@ typedef struct umb_mover_slot {
     double period;   /* that its volume was made to hold for */
     uint64_t shown;  /* the last commit that heard of its being reported */
     uint8_t why;     /* UMB_DUE_*: it is in the list of those that are due, for these reasons; 0: it is not */
+    uint8_t tested;  /* how often a culler said so of its volume since it was made */
+    uint8_t vain;    /* how often on end that made a smaller one, and it did not help */
     bool placed;     /* its pose is known */
     bool seen;       /* its volume was seen since it was made */
     bool exact;      /* its volume is where it is at the scene's time, no more */
@@ -82,7 +84,8 @@ enum {
     UMB_DUE_EXPIRED = 1u << 1,  /* its volume no longer holds */
     UMB_DUE_REVEALED = 1u << 2, /* its volume was seen and it was not */
     UMB_DUE_STOP = 1u << 3,     /* it is to stand still, or was removed */
-    UMB_DUE_SHOWN = 1u << 4     /* it was reported lately, or before that */
+    UMB_DUE_SHOWN = 1u << 4,    /* it was reported lately, or before that */
+    UMB_DUE_COSTLY = 1u << 5    /* its volume was hidden, but walks came upon it often */
 };
 
 /* The movers of a scene; motion.c. */

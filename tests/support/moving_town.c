@@ -97,6 +97,7 @@ static umb_motion_def motion_of(const moving_town *t, uint32_t object)
         break;
     case KIND_VOLUME:
         def.kind = UMB_MOTION_VOLUME;
+        def.max_speed = object % 2 == 0 ? 0.0 : speed + 2.0 * radius * turn;
         for (int i = 0; i < 3; ++i) {
             const umb_transform *m = &t->model->objects[object].transform;
             double x = m->m[i][3], reach = radius + 2.0 * c.radius + 0.01;
