@@ -481,6 +481,33 @@ static void test_life(void **state)
     lone_tear_down(&l);
 }
 
+/* Several commits between two frames: what is in sight is known all the while. When nobody looks any more, it is let go. */
+static void test_commits(void **state)
+{
+    (void)state;
+    lone l;
+    lone_set_up(&l);
+    assert_int_equal(umb_scene_set_poses(l.scene, &(umb_pose_source){lone_pose, &l}), UMB_OK);
+    umb_motion_def def = {.max_speed = 2.0};
+    umb_motion_stats stats;
+    assert_int_equal(umb_scene_set_motion(l.scene, l.mover, &def), UMB_OK);
+    assert_int_equal(umb_scene_flag_object(l.scene, l.wall, UMB_OBJECT_IGNORED), UMB_OK);
+    for (uint32_t frame = 0; frame < 40; ++frame) {
+        for (uint32_t k = 0; k < 3; ++k) {
+            lone_advance(&l, 20.0 + 0.02 * frame + 0.005 * k);
+        }
+        umb_visible_set seen = lone_see(&l, l.culler, 20.0 + 0.02 * frame + 0.01);
+        assert_true(sees(&seen, l.mover));
+        assert_true(seen.stats.poses == 0 || frame == 0);
+    }
+    for (uint32_t k = 0; k < 20; ++k) {
+        lone_advance(&l, 21.0 + k);
+        umb_scene_get_motion_stats(l.scene, &stats);
+        assert_int_equal(stats.exact, k < 5);
+    }
+    lone_tear_down(&l);
+}
+
 /* A promise that is not kept is counted; one that is not certain makes the answer approximate. */
 static void test_fuzzy(void **state)
 {
@@ -707,6 +734,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_walk),     cmocka_unit_test(test_other_times), cmocka_unit_test(test_adaptive),
         cmocka_unit_test(test_revealed), cmocka_unit_test(test_life),        cmocka_unit_test(test_fuzzy),
+        cmocka_unit_test(test_commits),
         cmocka_unit_test(test_steady),   cmocka_unit_test(test_failing),     cmocka_unit_test(test_threads),
         cmocka_unit_test(test_coherence),
     };

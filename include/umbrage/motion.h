@@ -21,7 +21,8 @@
  * How long a volume holds is adapted to each object: one that expires unseen is followed by one for twice as long; one
  * that is seen while its object is hidden, at once by one for half as long, and so is one that is hidden, but so large that culls
  * come upon it again and again. An object that was itself reported since the last
- * commit is put where it is by each commit, as if it were moved by hand, until it no longer is.
+ * commit (or before it, if no view has been answered since) is put where it is by each commit, as if it were moved by
+ * hand, until it no longer is.
  */
 #ifndef UMBRAGE_MOTION_H
 #define UMBRAGE_MOTION_H

@@ -13,9 +13,9 @@
 static umb_testimony tell(void *user, bool forget)
 {
     umb_movers *m = user;
-    umb_testimony t = {m->posed, m->shown, m->tested, m->posed_count, m->shown_count, m->tested_count};
+    umb_testimony t = {m->posed, m->shown, m->tested, m->posed_count, m->shown_count, m->tested_count, m->frames};
     if (forget) {
-        m->posed_count = m->shown_count = m->tested_count = 0;
+        m->posed_count = m->shown_count = m->tested_count = m->frames = 0;
         m->commit += 1;
     }
     return t;
@@ -123,6 +123,7 @@ const umb_committed *umb_movers_begin(umb_movers *m, const umb_allocator *a, con
     }
     m->now = time == scene->motion.time;
     m->frame = m->frame < UINT32_MAX ? m->frame + 1 : 1;
+    m->frames += m->frames < UINT32_MAX;
     m->met = 0;
     m->told_time = time;
     m->told_version = scene->version;

@@ -21,6 +21,7 @@ typedef struct umb_movers {
     size_t occluder_capacity, posed_capacity, place_capacity, shown_capacity, shown_in_capacity, tested_capacity;
     uint32_t posed_count, shown_count, tested_count;
     uint32_t frame, met; /* the frame that is going on; how many movers were met in it */
+    uint32_t frames;     /* since the last commit */
     uint64_t version, structure; /* of the scene that occluders is a copy of; version 0: of none */
     uint64_t told_version;       /* that poses were told for */
     uint64_t commit;

@@ -21,6 +21,8 @@
  * may be out of the walks' way because it is smaller. If it is not, it is asked of it half as often, and so on so many times. */
 #define MOST_TESTED 3
 #define MOST_VAIN 5
+/* Commits without a frame between them that change nothing in who is taken to be in sight. */
+#define MOST_BLIND 4
 
 /* ---- witnesses ------------------------------------------------------------------------------ */
 
@@ -293,10 +295,16 @@ static bool grows(const umb_motion_def *def)
 }
 
 /* It was seen of late, and is likely to be seen again: as long as it is, it is put where it is at each commit, like
- * anything that is moved, which costs less than to ask for it in the walk. */
+ * anything that is moved, which costs less than to ask for it in the walk. Where nobody has looked since the last commit, what
+ * was seen before counts, but not for long. */
+static bool is_shown(const umb_movers_state *m, const umb_mover_slot *mover)
+{
+    return mover->shown == m->commit || (m->blind > 0 && m->blind <= MOST_BLIND && mover->exact);
+}
+
 static bool stays_exact(const umb_movers_state *m, const umb_mover_slot *mover)
 {
-    return mover->shown == m->commit && (mover->why & UMB_DUE_FRESH) == 0;
+    return is_shown(m, mover) && (mover->why & UMB_DUE_FRESH) == 0;
 }
 
 /* Nothing is known: it is asked for again in every cull and at every commit. */
@@ -493,7 +501,7 @@ static void follow_exact(umb_movers_state *m, bool time_goes_on)
     m->next_exact_count = 0;
     for (uint32_t i = 0; i < m->exact_count; ++i) {
         const umb_mover_slot *mover = &m->slots[m->exact[i]];
-        if (time_goes_on || mover->shown != m->commit || mover->why != 0) {
+        if (time_goes_on || !is_shown(m, mover) || mover->why != 0) {
             make_due(m, m->exact[i], UMB_DUE_SHOWN);
         } else {
             m->next_exact[m->next_exact_count++] = m->exact[i];
@@ -506,8 +514,10 @@ static void follow_exact(umb_movers_state *m, bool time_goes_on)
 static void listen(umb_scene *scene)
 {
     umb_movers_state *m = &scene->moving;
+    m->blind += m->blind < UINT32_MAX;
     for (umb_scene_witness *w = m->witnesses; w != NULL; w = w->next) {
         umb_testimony t = w->tell(w->user, false);
+        m->blind = t.frames > 0 ? 0 : m->blind;
         hear(m, &t);
     }
     follow_exact(m, m->time != m->made_at);

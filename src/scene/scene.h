@@ -61,6 +61,7 @@ typedef struct umb_testimony {
     const uint32_t *shown;   /* numbers of exact ones that it reported */
     const uint32_t *tested;  /* numbers of those whose volumes it tested, and they were hidden: a part of these, each time */
     uint32_t posed_count, shown_count, tested_count;
+    uint32_t frames;         /* that it answered */
 } umb_testimony;
 
 /* Cullers register to be asked at each commit what they saw of moving objects. It is theirs, and forgotten when forget is

@@ -103,6 +103,7 @@ typedef struct umb_movers_state {
     double time;        /* from the next commit on */
     double made_at;     /* the time at the last commit, though it failed */
     uint64_t commit;    /* its number */
+    uint32_t blind;     /* commits on end, this one included, before which no culler has answered anything */
     umb_motion_stats stats;
     umb_scene_witness *witnesses;
     atomic_flag witness_lock;
