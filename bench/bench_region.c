@@ -5,7 +5,8 @@
  * DATA is bench/papers/leyvand.csv, which says what is measured. Prints Markdown tables: times are processor time, the least of
  * --repeat (3) answers (of the refinement: of one) on one core, sets in triangles of their objects and in objects. "Seen" is what --rays (2M)
  * rays from the cell prove; what an answer lacks of it is a miss; with --rays 0 nobody looks and the time to load is short. --effort: of the
- * refinement (0, the default: the library's own; none: no refinement). --only: rows whose table or label contains TEXT;
+ * refinement (0, the default: the library's own; none: no refinement). --only: rows whose table or label contains TEXT, or one of several
+ * with commas between;
  * --most: leave out larger generated scenes. --plots writes region-TABLE-time.svg and -size.svg for the sweeps.
  * Exit code 1 on a miss. */
 #include <inttypes.h>
@@ -120,7 +121,17 @@ static void read_row(char *fields[COLUMNS], row *r)
 
 static bool wanted(const study *s, const row *r)
 {
-    return s->only == NULL || strstr(r->table, s->only) != NULL || strstr(r->label, s->only) != NULL;
+    char text[128];
+    const char *at = s->only;
+    while (at != NULL) {
+        const char *comma = strchr(at, ',');
+        (void)snprintf(text, sizeof text, "%.*s", comma != NULL ? (int)(comma - at) : 100, at);
+        if (strstr(r->table, text) != NULL || strstr(r->label, text) != NULL) {
+            return true;
+        }
+        at = comma != NULL ? comma + 1 : NULL;
+    }
+    return s->only == NULL;
 }
 
 static bool read_line(study *s, char *line)
@@ -356,7 +367,6 @@ static bool measure(study *s, world *w, row *r)
     (void)fprintf(stderr, "%s %s: %.1f + %.1f ms, pvs %u, refined %u, seen %u, misses %u\n",
                   r->table, r->label, r->ours.solve_ms, r->ours.refine_ms, r->ours.pvs,
                   r->ours.refined, r->seen, r->ours.misses + r->thesis.misses);
-    fprintf(stderr, "   nodes %u queries %u occluders %u patches %u undecided %u\n", a.stats.nodes, a.stats.queries, a.stats.occluders, a.stats.patches, a.stats.undecided);
     return true;
 }
 
@@ -420,9 +430,33 @@ static void print_row(const row *r)
            r->ours.misses + r->thesis.misses);
 }
 
+/* Without refinement and rays. */
+static void print_maps(const study *s, const char *table)
+{
+    puts("| | thesis: s | PVS triangles | its mode here: ms | PVS triangles | here: ms | PVS objects | triangles |");
+    puts("|---|---|---|---|---|---|---|---|");
+    for (uint32_t i = 0; i < s->row_count; ++i) {
+        const row *r = &s->rows[i];
+        if (!r->done || strcmp(r->table, table) != 0) {
+            continue;
+        }
+        printf("| %s | %s | %s | ", r->label, r->theirs[0], r->theirs[1]);
+        if (r->is_thesis) {
+            printf("%.0f | %" PRIu64, r->thesis.solve_ms, r->thesis.pvs_triangles);
+        } else {
+            printf("- | -");
+        }
+        printf(" | %.1f | %u | %" PRIu64 " |\n", r->ours.solve_ms, r->ours.pvs, r->ours.pvs_triangles);
+    }
+}
+
 static void print_table(const study *s, const char *table)
 {
     printf("\n### %s%s\n\n", table[0] == '3' ? "Table " : "By ", table);
+    if (!s->refine && s->rays == 0) {
+        print_maps(s, table);
+        return;
+    }
     if (table[0] == '3') {
         puts("| cell | thesis: s | PVS | VS | PVS/VS | its mode here: ms | PVS | here: ms | refine "
              "ms | PVS | "

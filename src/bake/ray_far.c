@@ -82,6 +82,18 @@ static bool cover_row(drawing *d, uint32_t row, uint32_t *first, uint32_t *last)
     return *first <= *last;
 }
 
+/* Most of what is very far away covers no pixel at all. */
+static bool covers_any(drawing *d)
+{
+    const umb_ray_map *m = d->map;
+    double s0 = m->s0, s1 = m->s0 + m->rows * UMB_TILE * m->ds, width = 0.0;
+    for (int k = 0; k < 4; ++k) {
+        double s = (k & 1) != 0 ? s1 : s0, wide = d->high[k >> 1].at - d->low[k >> 1].at;
+        width = umb_most(width, wide + s * (d->high[k >> 1].slope - d->low[k >> 1].slope));
+    }
+    return width >= m->dt;
+}
+
 static void draw_tile(drawing *d, uint32_t row, uint32_t column)
 {
     umb_ray_map *m = d->map;
@@ -140,16 +152,19 @@ bool umb_ray_map_block_far(umb_ray_map *map, const umb_umbra_kernels *kernels, c
     if (c.top_count < 2 || c.bottom_count < 2 || (half && !floor)) {
         return true; /* no use */
     }
-    double loss;
-    bounds_over(map, b, &c, floor, &d.strip, &loss);
-    if (!(loss <= 1.5 * map->dt * map->beta1)) {
-        return false;
-    }
     const umb_ray_point *p = b->vertices;
     d.low[0] = place_of(map, &p[c.top[0]]);
     d.low[1] = place_of(map, &p[c.bottom[0]]);
     d.high[0] = place_of(map, &p[c.top[c.top_count - 1]]);
     d.high[1] = place_of(map, &p[c.bottom[c.bottom_count - 1]]);
+    if (!covers_any(&d)) {
+        return true;
+    }
+    double loss;
+    bounds_over(map, b, &c, floor, &d.strip, &loss);
+    if (!(loss <= 1.5 * map->dt * map->beta1)) {
+        return false;
+    }
     uint32_t first, last;
     for (uint32_t row = 0; row < map->rows; ++row) {
         if (cover_row(&d, row, &first, &last)) {
