@@ -10,6 +10,7 @@
 
 #include <cmocka.h>
 
+#include "bake/ray_far.h"
 #include "bake/ray_map.h"
 #include "bake/region_state.h"
 #include "support/failing.h"
@@ -277,11 +278,69 @@ static void test_kernels(void **state)
     }
 }
 
+/* ---- far occluders -------------------------------------------------------------------------------- */
+
+/* Every line of a pixel that a wall was drawn into meets the wall, below its top and not beyond the depth that is told. */
+static uint32_t check_wall(const umb_ray_map *m, const umb_ray_blocker *b, dice *d)
+{
+    const umb_ray_frame *f = m->frame;
+    slice k = {-f->hu, f->hu, f->z0, f->z1};
+    uint32_t drawn = 0;
+    for (uint32_t i = 0; i < m->rows * m->columns * 64; ++i) {
+        uint32_t tile = i / 64, pixel = i % 64;
+        const umb_umbra_tile *t = &m->intervals[tile];
+        if (!m->drawn[tile] || !(m->live[tile] >> pixel & 1) || !(t->top[pixel] > -INFINITY)) {
+            continue;
+        }
+        drawn += 1;
+        double row = tile / m->columns * UMB_TILE + pixel / UMB_TILE, column = tile % m->columns * UMB_TILE + pixel % UMB_TILE;
+        for (int n = 0; n < 8; ++n) {
+            double s = m->s0 + (row + (n < 4 ? n & 1 : between(d, 0, 1))) * m->ds;
+            double x = m->t0 + (column + (n < 4 ? n >> 1 : between(d, 0, 1))) * m->dt;
+            const umb_ray_point *p = b->vertices;
+            double f0 = p[0].v - s - p[0].u * x, f1 = p[1].v - s - p[1].u * x, part = f0 / (f0 - f1);
+            assert_true(f0 * f1 <= 0.0);
+            point top = {p[0].u + part * (p[1].u - p[0].u), p[3].z + part * (p[2].z - p[3].z)};
+            point bottom = {top.u, p[0].z + part * (p[1].z - p[0].z)};
+            assert_true(least_slope(&k, top) >= t->top[pixel] && greatest_slope(&k, top) >= t->top_far[pixel]);
+            assert_true(greatest_slope(&k, bottom) <= t->bottom[pixel] && least_slope(&k, bottom) <= t->bottom_far[pixel]);
+            assert_true(top.u <= t->depth[pixel]);
+        }
+    }
+    return drawn;
+}
+
+static void test_far(void **state)
+{
+    (void)state;
+    umb_allocator a = umb_memory_allocator(NULL);
+    umb_ray_frame frame = {2, 1.5, -1, 1, {0, 0, 0}, 0, 1, 2, 1, 1e-12};
+    umb_ray_map map = {0};
+    dice d = {41};
+    uint32_t drawn = 0;
+    for (int i = 0; i < (is_small() ? 40 : 400); ++i) {
+        umb_ray_blocker b = {.count = 4, .ring = 4};
+        double u = between(&d, 20, 300), v = between(&d, -200, 200), width = between(&d, 1, 40), z = between(&d, -20, 60);
+        double turn = between(&d, -0.1, 0.1) * width, up = between(&d, 1, 30);
+        b.vertices[0] = b.vertices[3] = (umb_ray_point){u, v, z};
+        b.vertices[1] = b.vertices[2] = (umb_ray_point){u + turn, v + width, z + between(&d, -0.1, 0.1)};
+        b.vertices[3].z += up;
+        b.vertices[2].z += up;
+        assert_int_equal(umb_ray_map_begin(&map, &a, &frame, UMB_RAY_SLAB, 0.0, 256, 1), UMB_OK);
+        if (umb_ray_map_block_far(&map, umb_umbra_kernels_get(UMB_ISA_AUTO), &b, false)) {
+            drawn += check_wall(&map, &b, &d);
+        }
+    }
+    umb_ray_map_free(&map, &a);
+    assert_true(drawn > 5000);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_slices),  cmocka_unit_test(test_joins), cmocka_unit_test(test_corners),
-        cmocka_unit_test(test_rays),    cmocka_unit_test(test_kernels),
+        cmocka_unit_test(test_rays),
+        cmocka_unit_test(test_far),    cmocka_unit_test(test_kernels),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
