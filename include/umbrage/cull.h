@@ -109,7 +109,7 @@ typedef struct umb_cull_stats {
     uint32_t occluders;    /* occluders drawn */
     uint32_t edges;        /* silhouette edges drawn */
     uint32_t small;        /* objects dropped by the contribution threshold */
-    uint32_t idle;         /* occluders not drawn because it would have changed little or nothing */
+    uint32_t idle;         /* occluders (or objects that might have been) not drawn: it would have changed little or nothing */
     uint32_t early;        /* of the occluders drawn: by UMB_COHERENCE_LIST, before the walk */
     uint32_t saved;        /* boxes not tested for occlusion, thanks to what was remembered */
     uint32_t resting;      /* occluders not drawn by UMB_COHERENCE_REST */

@@ -41,6 +41,11 @@
 #define LEAST_MESH_PIXELS 4
 /* Where it is less than this, a sub-tile is hardly ever covered by one occluder alone. */
 #define DEPTH_PIXELS 16
+/* Questions about bodies, see is_worth_asking(). */
+#define BODY_START 8
+#define BODY_GAIN 16
+#define BODY_CREDIT 64
+#define BODY_SAMPLE 16
 
 struct umb_culler {
     umb_allocator allocator;
@@ -82,7 +87,10 @@ typedef struct walk {
     umb_once *once; /* NULL: each item has one slot */
     const umb_filter *present; /* NULL: nothing is left out of the walk */
     float most_w;
+    bool plain; /* each item has one slot, and none is too small: what is hidden is only counted */
     uint32_t drawn;
+    int32_t credit; /* of questions about bodies */
+    uint32_t unasked;
     umb_cull_stats stats;
 } walk;
 
@@ -276,6 +284,50 @@ static umb_image image_of(const umb_projected *p, uint32_t slot)
                        p->nearness[slot]};
 }
 
+static int side_of(const umb_pixel_rect *r)
+{
+    int wide = r->x1 - r->x0, high = r->y1 - r->y0;
+    return wide < high ? wide : high;
+}
+
+/* True if drawing an occluder is sure, or all but sure, to change nothing (Gummerus 5.2, redundancy): its box's image
+ * is too small, or there is no open pixel left within it. Pixels at the image's border are hardly ever covered wholly:
+ * most of what peeps out from behind something is open there and nowhere else. Where every pixel is covered a drawing
+ * could still bring the depth of a sub-tile nearer that it covers alone; that takes a large image. */
+static bool is_idle(walk *w, bool convex, const umb_waiting *item)
+{
+    const umb_culler *c = w->culler;
+    const umb_pixel_rect *r = &item->image.rect;
+    if (!item->testable) {
+        return false;
+    }
+    int side = side_of(r);
+    if (side < (convex ? LEAST_PIXELS : LEAST_MESH_PIXELS)) {
+        return true;
+    }
+    if (side >= DEPTH_PIXELS || w->drawn == 0) {
+        return false;
+    }
+    umb_image within = {{(int16_t)(r->x0 + (r->x0 > 0)), (int16_t)(r->y0 + (r->y0 > 0)),
+                         (int16_t)(r->x1 - (r->x1 + 1 < (int)w->map.width)),
+                         (int16_t)(r->y1 - (r->y1 + 1 < (int)w->map.height))},
+                        -FLT_MAX};
+    w->stats.queries += 1;
+    return c->ops->hidden(c->method, &within, NULL);
+}
+
+/* An object's first turn is for drawing it before what is behind. One that is idle already needs none: open pixels only
+ * become fewer. Where objects move by themselves the first turn asks for their poses, too. */
+static bool may_skip_turn(walk *w, const umb_waiting *item)
+{
+    if ((item->ref & UMB_REF_KIND) != UMB_REF_OBJECT || w->culler->ops == NULL || w->scene->motion.count != 0 ||
+        w->drawn == 0 || !is_idle(w, true, item)) {
+        return false;
+    }
+    w->stats.idle += 1;
+    return true;
+}
+
 static void push(walk *w, const opening *o, const umb_projected *p, uint32_t slot, uint16_t planes)
 {
     umb_heap *heap = &w->culler->heap;
@@ -290,8 +342,9 @@ static void push(walk *w, const opening *o, const umb_projected *p, uint32_t slo
     item->part = 0;
     item->planes = planes;
     item->testable = (p->testable >> slot & 1u) != 0;
-    item->waited = false;
-    umb_heap_push(heap, item->nearest, taken);
+    item->asked = false;
+    item->waited = may_skip_turn(w, item);
+    umb_heap_push(heap, item->waited ? item->settled : item->nearest, taken);
     fetch(w, item->ref);
 }
 
@@ -357,6 +410,16 @@ static bool meet(walk *w, uint32_t ref)
     return !umb_once_has(w->once, *entry, UMB_ONCE_SETTLED);
 }
 
+/* A bit for each slot of a kind; empty slots are none. */
+static uint32_t slots_of_kind(const umb_node *boxes, uint32_t kind)
+{
+    uint32_t slots = 0;
+    for (uint32_t slot = 0; slot < UMB_NODE_WIDTH; ++slot) {
+        slots |= (uint32_t)((boxes->ref[slot] & UMB_REF_KIND) == kind) << slot;
+    }
+    return slots;
+}
+
 /* Test eight boxes and have those wait that may be seen. */
 static void open_boxes(walk *w, opening *o)
 {
@@ -383,14 +446,21 @@ static void open_boxes(walk *w, opening *o)
         hides |= umb_past_has(&c->past, UMB_COHERENCE_PROPAGATION) ? ask_by_neighbours(w, &projected, mask)
                                                                      : ask(w, &projected, mask);
     }
+    if (w->plain) {
+        uint32_t objects = slots_of_kind(boxes, UMB_REF_OBJECT), nodes = slots_of_kind(boxes, UMB_REF_NODE);
+        w->stats.in_frustum += (uint32_t)__builtin_popcount(left & objects);
+        w->stats.hidden_objects += (uint32_t)__builtin_popcount(left & hides & objects);
+        w->stats.hidden_nodes += (uint32_t)__builtin_popcount(left & hides & nodes);
+        left &= ~hides;
+    }
     for (; left != 0; left &= left - 1) {
         uint32_t slot = (uint32_t)__builtin_ctz(left), ref = boxes->ref[slot];
-        if (!meet(w, ref)) {
+        if (!w->plain && !meet(w, ref)) {
             continue;
         }
         if ((hides >> slot & 1u) != 0) {
             count_hidden(w, ref);
-        } else if (!too_small(w, boxes, slot)) {
+        } else if (w->plain || !too_small(w, boxes, slot)) {
             push(w, o, &projected, slot, o->child_planes[slot]);
         }
     }
@@ -405,28 +475,6 @@ static void open_node(walk *w, uint32_t number, uint16_t planes)
     umb_tree_note_open(w->tree, number);
     w->stats.nodes += 1;
     open_boxes(w, &o);
-}
-
-/* True if drawing an occluder is sure, or all but sure, to change nothing (Gummerus 5.2, redundancy): its box's image
- * is too small, or there is no open pixel left in it. Where every pixel is covered a drawing could still bring the
- * depth of a sub-tile nearer that it covers alone; that takes a large image. */
-static bool is_idle(walk *w, bool convex, const umb_waiting *item)
-{
-    const umb_culler *c = w->culler;
-    const umb_pixel_rect *r = &item->image.rect;
-    if (!item->testable) {
-        return false;
-    }
-    int side = r->x1 - r->x0 < r->y1 - r->y0 ? r->x1 - r->x0 : r->y1 - r->y0;
-    if (side < (convex ? LEAST_PIXELS : LEAST_MESH_PIXELS)) {
-        return true;
-    }
-    if (side >= DEPTH_PIXELS || w->drawn == 0) {
-        return false;
-    }
-    umb_image pixels = {*r, -FLT_MAX};
-    w->stats.queries += 1;
-    return c->ops->hidden(c->method, &pixels, NULL);
 }
 
 /* Draw an occluder, unless it is not worth it. box: its own, if it is one that stands along the axes, else NULL. */
@@ -502,6 +550,23 @@ static void report(walk *w, const umb_waiting *item)
     }
 }
 
+/* Where boxes say nearly as much as the bodies in them, most questions about bodies are for nothing: each costs one
+ * of a credit that each success makes larger; without credit one of a few is asked to see whether luck has turned. */
+static bool is_worth_asking(walk *w)
+{
+    return w->credit > 0 || ++w->unasked % BODY_SAMPLE == 0;
+}
+
+static bool body_shows(walk *w, const umb_object *o, const umb_waiting *item)
+{
+    const umb_culler *c = w->culler;
+    bool hides = c->ops->hides_body(c->method, o->occluder, &item->image);
+    w->stats.queries += 1;
+    w->credit += hides ? BODY_GAIN : -(w->credit > 0);
+    w->credit = w->credit < BODY_CREDIT ? w->credit : BODY_CREDIT;
+    return !hides;
+}
+
 /* True if the object may be seen, asked in detail when its shape is all that is drawn. */
 static bool object_shows(walk *w, const umb_object *o, umb_waiting *item)
 {
@@ -515,8 +580,7 @@ static bool object_shows(walk *w, const umb_object *o, umb_waiting *item)
         return true;
     case UMB_DETAIL_BODY:
         if (item->testable) {
-            w->stats.queries += 1;
-            return !c->ops->hides_body(c->method, o->occluder, &item->image);
+            return !is_worth_asking(w) || body_shows(w, o, item);
         }
         break;
     case UMB_DETAIL_PARTS:
@@ -584,8 +648,10 @@ static bool visit_object(walk *w, umb_waiting *item, const umb_heap_entry *entry
     bool first = !item->waited, hides = o->occluder != UMB_NONE;
     bool can_wait = w->culler->ops != NULL;
     bool settled = !can_wait || !(item->settled > umb_heap_key(entry));
-    bool ask = hides ? first || item->stamp != w->drawn : !first || settled;
+    bool early = first && hides;
+    bool ask = settled ? !item->asked || item->stamp != w->drawn : early;
     item->waited = true;
+    item->asked = item->asked || ask;
     if (ask && !object_shows(w, o, item)) {
         w->stats.hidden_objects += 1;
         if (umb_detail_of(o) == UMB_DETAIL_PARTS) { /* all of its shape was asked about, not what is in one box */
@@ -795,7 +861,9 @@ static void prepare_walk(walk *w, umb_culler *c, const umb_view *view)
     w->culler = c;
     w->view = view;
     w->once = w->tree->several ? &c->once : NULL;
-    w->drawn = 0;
+    w->drawn = w->unasked = 0;
+    w->credit = BODY_START;
+    w->plain = w->once == NULL && !(view->min_pixels > 0.0);
     w->stats = (umb_cull_stats){0};
     umb_frustum_prepare(&w->frustum, view);
     if (c->ops == NULL && c->def.unordered) {

@@ -19,7 +19,8 @@ typedef struct umb_waiting {
     uint32_t part;   /* objects: parts before this one are hidden */
     uint16_t planes; /* frustum planes that its box may cross */
     bool testable;   /* in front of the eye everywhere */
-    bool waited;     /* objects: its turn has come before; now it waits until it is settled */
+    bool waited : 1; /* objects: its turn has come before, or it needs none; now it waits until it is settled */
+    bool asked : 1;  /* objects: its shape has been asked about */
 } umb_waiting;
 
 /* What the heap moves about: its order, and where the rest is. The order holds, from the top bits down, the W

@@ -17,7 +17,7 @@ typedef struct raster {
     umb_mesh_scratch scratch;
     umb_convex convex; /* of the occluder convex_of, UMB_NONE: of none */
     umb_convex_result convex_found;
-    uint32_t convex_of;
+    uint32_t convex_of, placed; /* placed: the occluder whose corners the scratch holds */
     umb_ahead ahead;
 } raster;
 
@@ -48,7 +48,7 @@ static umb_result prepare(void *state, const umb_raster_map *map, const umb_comm
     raster *r = state;
     r->map = *map;
     r->scene = scene;
-    r->convex_of = UMB_NONE;
+    r->convex_of = r->placed = UMB_NONE;
     if (!umb_coverage_resize(&r->coverage, &r->allocator, map->width, map->height) ||
         !umb_mesh_scratch_reserve(&r->scratch, &r->allocator, map, scene)) {
         return UMB_ERROR_MEMORY;
@@ -91,18 +91,39 @@ static bool open_at(const void *state, double x, double y, double nearness)
     return (t->mask[r] >> bit & 1u) == 0 || t->z[4 * (r / 4) + bit / 8] < nearness;
 }
 
+static void place(raster *r, uint32_t occluder)
+{
+    if (r->placed != occluder) {
+        r->placed = occluder;
+        r->convex_of = UMB_NONE;
+        r->kernels->place(&r->scratch.silhouette, &r->map, &r->scene->occluders[occluder]);
+    }
+}
+
 /* The convex image of an occluder; asked for and drawn one after the other, it is found once. */
 static umb_convex_result find_convex(raster *r, uint32_t occluder)
 {
-    const umb_occluder *o = &r->scene->occluders[occluder];
+    const umb_silhouette *s = &r->scratch.silhouette;
+    place(r, occluder);
     if (r->convex_of != occluder) {
         r->convex_of = occluder;
-        r->kernels->place(&r->scratch.silhouette, &r->map, o);
-        r->convex_found = !r->scratch.silhouette.any  ? UMB_CONVEX_NOTHING
-                          : r->scratch.silhouette.cut ? UMB_CONVEX_OTHER
-                                              : r->kernels->find_convex(&r->map, o, &r->scratch.silhouette, &r->convex);
+        r->convex_found = !s->any  ? UMB_CONVEX_NOTHING
+                          : s->cut ? UMB_CONVEX_OTHER
+                                   : r->kernels->find_convex(&r->map, &r->scene->occluders[occluder], s, &r->convex);
     }
     return r->convex_found;
+}
+
+/* Most bodies that may be seen show a corner. */
+static bool shows_corner(const raster *r)
+{
+    const umb_silhouette *s = &r->scratch.silhouette;
+    for (uint32_t v = 0; v < s->vertex_count; ++v) {
+        if (open_at(r, s->x[v], s->y[v], s->near_least[v])) {
+            return true;
+        }
+    }
+    return false;
 }
 
 static bool is_body(const umb_mesh *mesh)
@@ -113,8 +134,12 @@ static bool is_body(const umb_mesh *mesh)
 static bool hides_body(void *state, uint32_t occluder, const umb_image *image)
 {
     raster *r = state;
-    if (!is_body(r->scene->occluders[occluder].mesh) || find_convex(r, occluder) == UMB_CONVEX_OTHER ||
-        !r->scratch.silhouette.any || r->scratch.silhouette.cut) {
+    if (!is_body(r->scene->occluders[occluder].mesh)) {
+        return false;
+    }
+    place(r, occluder);
+    if (!r->scratch.silhouette.any || r->scratch.silhouette.cut || shows_corner(r) ||
+        find_convex(r, occluder) == UMB_CONVEX_OTHER) {
         return false;
     }
     return r->kernels->hides_convex(&r->coverage, &r->map, &r->convex, image->rect);
@@ -134,7 +159,7 @@ static uint32_t occlude_with_mesh(raster *r, uint32_t occluder, umb_cull_stats *
     } else {
         const umb_occluder *o = &r->scene->occluders[occluder];
         umb_silhouette *s = &r->scratch.silhouette;
-        r->convex_of = UMB_NONE;
+        r->convex_of = r->placed = UMB_NONE;
         r->kernels->place(s, &r->map, o);
         drawn = umb_mesh_image_find(&r->scratch, &r->map, o);
         edge_count = drawn ? s->edge_count : 0;
@@ -173,7 +198,7 @@ static uint32_t occlude(void *state, uint32_t occluder, const umb_aabb *box, umb
     }
     umb_convex_result found = find_convex(r, occluder);
     if (found == UMB_CONVEX_OTHER) {
-        r->convex_of = UMB_NONE;
+        r->convex_of = r->placed = UMB_NONE;
         if (!umb_mesh_image_find(&r->scratch, &r->map, o)) {
             return 0;
         }
