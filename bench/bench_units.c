@@ -1,9 +1,10 @@
 /* Frames of the `blocks` workload in units: one plain pass of the frustum test over all boxes (yardstick.h), in the same
  * run. What compare.c prints beside rivals and exact answers, in seconds instead of many minutes.
  *
- *     bench_units [--rounds N] [G...]      G: blocks a side; 32 100 316
+ *     bench_units [--rounds N] [G...]      G: blocks a side; all of 32, 100 and 316 if none is given
  *
- * A round is the yardstick over all 64 views of the recipe, then the frames of the same views. What counts of a view is
+ * A round is the yardstick over all 64 views of the recipe, then the frames of the same views; for 100 blocks a side also
+ * with the camera rolled, and above all roofs. What counts of a view is
  * its least time; printed are medians over views. */
 #include <stdio.h>
 #include <stdlib.h>
@@ -59,20 +60,37 @@ static bool run_round(bench *b)
     return true;
 }
 
-static void print(const bench *b, const char *spec, double unit, double frame)
+static void print(const bench *b, const char *label, double unit, double frame)
 {
     double n = b->c.count;
-    (void)printf("%-14s %9.4f %9.4f %7.3f   %7.0f %7.0f %8.0f %7.0f %7.0f %8.1f\n", spec, unit, frame, frame / unit,
+    (void)printf("%-14s %9.4f %9.4f %7.3f   %7.0f %7.0f %8.0f %7.0f %7.0f %8.1f\n", label, unit, frame, frame / unit,
                  (double)b->sum.nodes / n, (double)b->sum.boxes / n, (double)b->sum.queries / n,
                  (double)b->sum.occluders / n, (double)b->sum.idle / n, (double)b->sum.visible / n);
 }
 
-static bool measure(const char *spec, uint32_t rounds, umb_error *error)
+typedef struct row {
+    const char *blocks, *name;
+    camera_turn turn;
+} row;
+
+static const row usual[] = {
+    {"32", "recipe", {0.0, 0.0, 0.0}},
+    {"100", "recipe", {0.0, 0.0, 0.0}},
+    {"100", "rolled", {-12.0, 17.0, 0.0}},
+    {"100", "above", {-20.0, 0.0, 60.0}},
+    {"316", "recipe", {0.0, 0.0, 0.0}},
+};
+enum { USUAL = sizeof usual / sizeof usual[0] };
+
+static bool measure(const row *r, uint32_t rounds, umb_error *error)
 {
     static bench b;
+    char spec[64], label[64];
     memset(&b, 0, sizeof b);
+    (void)snprintf(spec, sizeof spec, "gen:blocks,g=%.20s", r->blocks);
+    (void)snprintf(label, sizeof label, "g=%.20s %.20s", r->blocks, r->name);
     bool ok = world_load(&b.w, spec, spec, UINT32_MAX, error) &&
-              cameras_path(&b.c, &b.w, "recipe", spec, NULL, 1, VIEWS_MOST - 1, (camera_turn){0}, error) &&
+              cameras_path(&b.c, &b.w, r->name, spec, NULL, 1, VIEWS_MOST - 1, r->turn, error) &&
               umb_culler_create(b.w.index[UMB_INDEX_BVH], &(umb_culler_def){.method = UMB_METHOD_RASTER, .error = error},
                                 &b.culler) == UMB_OK;
     b.mask = calloc((size_t)b.w.box_count / 8 + 64, 1);
@@ -83,7 +101,7 @@ static bool measure(const char *spec, uint32_t rounds, umb_error *error)
         ok = run_round(&b);
     }
     if (ok) {
-        print(&b, spec, contest_median(b.unit, b.c.count), contest_median(b.frame, b.c.count));
+        print(&b, label, contest_median(b.unit, b.c.count), contest_median(b.frame, b.c.count));
     }
     free(b.mask);
     umb_culler_destroy(b.culler);
@@ -94,7 +112,6 @@ static bool measure(const char *spec, uint32_t rounds, umb_error *error)
 
 int main(int argc, char **argv)
 {
-    static const char *const usual[] = {"32", "100", "316"};
     umb_error error = {0};
     uint32_t rounds = 30;
     int at = 1;
@@ -108,14 +125,16 @@ int main(int argc, char **argv)
     }
     (void)printf("umbrage %s; medians over 64 views, %u rounds, one thread; counts a frame\n", umb_version(), rounds);
     (void)puts("scene            unit ms  frame ms   units     nodes   boxes  queries   drawn    idle  visible");
-    bool all = at == argc;
-    for (int i = all ? 0 : at; i < (all ? 3 : argc); ++i) {
-        char spec[64];
-        (void)snprintf(spec, sizeof spec, "gen:blocks,g=%.20s", all ? usual[i] : argv[i]);
-        if (!measure(spec, rounds, &error)) {
-            (void)fprintf(stderr, "bench_units: %s\n", error.text);
-            return 3;
-        }
+    bool ok = true;
+    for (uint32_t i = 0; ok && at == argc && i < USUAL; ++i) {
+        ok = measure(&usual[i], rounds, &error);
+    }
+    for (; ok && at < argc; ++at) {
+        ok = measure(&(row){argv[at], "recipe", {0.0, 0.0, 0.0}}, rounds, &error);
+    }
+    if (!ok) {
+        (void)fprintf(stderr, "bench_units: %s\n", error.text);
+        return 3;
     }
     return 0;
 }

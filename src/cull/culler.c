@@ -41,11 +41,8 @@
 #define LEAST_MESH_PIXELS 4
 /* Where it is less than this, a sub-tile is hardly ever covered by one occluder alone. */
 #define DEPTH_PIXELS 16
-/* Questions about bodies, see is_worth_asking(). */
-#define BODY_START 8
-#define BODY_GAIN 16
-#define BODY_CREDIT 64
-#define BODY_SAMPLE 16
+/* Of so many drawings one may be unlikely to change anything. */
+#define UNLIKELY_SHARE 4
 
 struct umb_culler {
     umb_allocator allocator;
@@ -89,8 +86,7 @@ typedef struct walk {
     float most_w;
     bool plain; /* each item has one slot, and none is too small: what is hidden is only counted */
     uint32_t drawn;
-    int32_t credit; /* of questions about bodies */
-    uint32_t unasked;
+    uint32_t unlikely; /* occluders wanted though they hardly change anything */
     umb_cull_stats stats;
 } walk;
 
@@ -290,13 +286,24 @@ static int side_of(const umb_pixel_rect *r)
     return wide < high ? wide : high;
 }
 
+/* True if every pixel of a rectangle is covered, all but a border of it. */
+static bool is_closed(walk *w, const umb_pixel_rect *r, int border)
+{
+    umb_image within = {{(int16_t)(r->x0 + (r->x0 > 0 ? border : 0)), (int16_t)(r->y0 + (r->y0 > 0 ? border : 0)),
+                         (int16_t)(r->x1 - (r->x1 + 1 < (int)w->map.width ? border : 0)),
+                         (int16_t)(r->y1 - (r->y1 + 1 < (int)w->map.height ? border : 0))},
+                        -FLT_MAX};
+    w->stats.queries += 1;
+    return w->culler->ops->hidden(w->culler->method, &within, NULL);
+}
+
 /* True if drawing an occluder is sure, or all but sure, to change nothing (Gummerus 5.2, redundancy): its box's image
- * is too small, or there is no open pixel left within it. Pixels at the image's border are hardly ever covered wholly:
- * most of what peeps out from behind something is open there and nowhere else. Where every pixel is covered a drawing
- * could still bring the depth of a sub-tile nearer that it covers alone; that takes a large image. */
+ * is too small, or there is no open pixel left in it. Pixels at the image's border are hardly ever covered wholly, and
+ * most of what peeps out from behind something is open there and nowhere else: where only they are open it is drawn if
+ * enough was drawn by now for that not to matter. Where every pixel is covered a drawing could still bring the depth of a
+ * sub-tile nearer that it covers alone; that takes a large image. */
 static bool is_idle(walk *w, bool convex, const umb_waiting *item)
 {
-    const umb_culler *c = w->culler;
     const umb_pixel_rect *r = &item->image.rect;
     if (!item->testable) {
         return false;
@@ -305,15 +312,12 @@ static bool is_idle(walk *w, bool convex, const umb_waiting *item)
     if (side < (convex ? LEAST_PIXELS : LEAST_MESH_PIXELS)) {
         return true;
     }
-    if (side >= DEPTH_PIXELS || w->drawn == 0) {
+    if (side >= DEPTH_PIXELS || w->drawn == 0 || !is_closed(w, r, 1)) {
         return false;
     }
-    umb_image within = {{(int16_t)(r->x0 + (r->x0 > 0)), (int16_t)(r->y0 + (r->y0 > 0)),
-                         (int16_t)(r->x1 - (r->x1 + 1 < (int)w->map.width)),
-                         (int16_t)(r->y1 - (r->y1 + 1 < (int)w->map.height))},
-                        -FLT_MAX};
-    w->stats.queries += 1;
-    return c->ops->hidden(c->method, &within, NULL);
+    bool wanted = UNLIKELY_SHARE * w->unlikely < w->drawn && !is_closed(w, r, 0);
+    w->unlikely += wanted;
+    return !wanted;
 }
 
 /* An object's first turn is for drawing it before what is behind. One that is idle already needs none: open pixels only
@@ -550,23 +554,6 @@ static void report(walk *w, const umb_waiting *item)
     }
 }
 
-/* Where boxes say nearly as much as the bodies in them, most questions about bodies are for nothing: each costs one
- * of a credit that each success makes larger; without credit one of a few is asked to see whether luck has turned. */
-static bool is_worth_asking(walk *w)
-{
-    return w->credit > 0 || ++w->unasked % BODY_SAMPLE == 0;
-}
-
-static bool body_shows(walk *w, const umb_object *o, const umb_waiting *item)
-{
-    const umb_culler *c = w->culler;
-    bool hides = c->ops->hides_body(c->method, o->occluder, &item->image);
-    w->stats.queries += 1;
-    w->credit += hides ? BODY_GAIN : -(w->credit > 0);
-    w->credit = w->credit < BODY_CREDIT ? w->credit : BODY_CREDIT;
-    return !hides;
-}
-
 /* True if the object may be seen, asked in detail when its shape is all that is drawn. */
 static bool object_shows(walk *w, const umb_object *o, umb_waiting *item)
 {
@@ -580,7 +567,8 @@ static bool object_shows(walk *w, const umb_object *o, umb_waiting *item)
         return true;
     case UMB_DETAIL_BODY:
         if (item->testable) {
-            return !is_worth_asking(w) || body_shows(w, o, item);
+            w->stats.queries += 1;
+            return !c->ops->hides_body(c->method, o, &item->image);
         }
         break;
     case UMB_DETAIL_PARTS:
@@ -861,8 +849,7 @@ static void prepare_walk(walk *w, umb_culler *c, const umb_view *view)
     w->culler = c;
     w->view = view;
     w->once = w->tree->several ? &c->once : NULL;
-    w->drawn = w->unasked = 0;
-    w->credit = BODY_START;
+    w->drawn = w->unlikely = 0;
     w->plain = w->once == NULL && !(view->min_pixels > 0.0);
     w->stats = (umb_cull_stats){0};
     umb_frustum_prepare(&w->frustum, view);

@@ -102,7 +102,7 @@ typedef struct umb_method_ops {
     bool (*hidden)(const void *state, const umb_image *image, const umb_outline *outline);
     /* True if the convex body whose surface an occluder is is hidden; the image is its bounds'. False says
        nothing. */
-    bool (*hides_body)(void *state, uint32_t occluder, const umb_image *image);
+    bool (*hides_body)(void *state, const umb_object *object, const umb_image *image);
     /* True if something of this nearness at a raster point would surely not be found hidden: a cheap first
        question, whose answer false says nothing. */
     bool (*open_at)(const void *state, double x, double y, double nearness);

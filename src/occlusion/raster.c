@@ -131,15 +131,22 @@ static bool is_body(const umb_mesh *mesh)
     return mesh->convex && mesh->triangle_count <= UMB_CONVEX_TRIANGLES;
 }
 
-static bool hides_body(void *state, uint32_t occluder, const umb_image *image)
+/* An object says where its body is, too, and is at hand: its occluder, which nobody has looked at yet, is somewhere in a
+ * large list. */
+static bool hides_body(void *state, const umb_object *o, const umb_image *image)
 {
     raster *r = state;
-    if (!is_body(r->scene->occluders[occluder].mesh)) {
+    if (!is_body(o->mesh)) {
         return false;
     }
-    place(r, occluder);
+    if (r->placed != o->occluder) {
+        const umb_occluder body = {.mesh = o->mesh, .transform = o->transform, .identity = o->identity};
+        r->placed = o->occluder;
+        r->convex_of = UMB_NONE;
+        r->kernels->place(&r->scratch.silhouette, &r->map, &body);
+    }
     if (!r->scratch.silhouette.any || r->scratch.silhouette.cut || shows_corner(r) ||
-        find_convex(r, occluder) == UMB_CONVEX_OTHER) {
+        find_convex(r, o->occluder) == UMB_CONVEX_OTHER) {
         return false;
     }
     return r->kernels->hides_convex(&r->coverage, &r->map, &r->convex, image->rect);
