@@ -41,7 +41,8 @@
 #define LEAST_MESH_PIXELS 4
 /* Where it is less than this, a sub-tile is hardly ever covered by one occluder alone. */
 #define DEPTH_PIXELS 16
-/* Of so many drawings one may be unlikely to change anything. */
+/* Of so many drawings one may be unlikely to change anything; an object is counted when it is met and when it is drawn,
+ * so that it is half of that. */
 #define UNLIKELY_SHARE 4
 
 struct umb_culler {
