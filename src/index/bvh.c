@@ -50,7 +50,7 @@ static inline float highest_of(const float x[UMB_NODE_WIDTH])
                   higher(higher(x[1], x[5]), higher(x[3], x[7])));
 }
 
-umb_aabb umb_node_bounds(const umb_node *node)
+static inline umb_aabb bounds_of(const umb_node *node)
 {
     umb_aabb b;
     for (int i = 0; i < 3; ++i) {
@@ -58,6 +58,11 @@ umb_aabb umb_node_bounds(const umb_node *node)
         b.max[i] = highest_of(node->max[i]);
     }
     return b;
+}
+
+umb_aabb umb_node_bounds(const umb_node *node)
+{
+    return bounds_of(node);
 }
 
 /* ---- wide nodes ----------------------------------------------------------------------------- */
@@ -438,8 +443,22 @@ static inline bool is_large(const umb_bvh_marks *marks)
     return marks->node_words > IN_CACHES / 64 + 1;
 }
 
-/* Bring a marked node's box up to its parent, which is marked when that changes it. By bits, so
- * that the result is that of a full refit to the sign of a zero. */
+/* Write a node's box into its slot of the parent; true if that changes it. By bits, so that the result is that of a full refit
+ * to the sign of a zero. What stays as it is is not written: in a large tree each line written is one more to bring back. */
+static inline bool tell_parent(umb_node *parent, uint32_t slot, const umb_aabb *box, bool always)
+{
+    uint32_t changed = 0;
+    for (int i = 0; i < 3; ++i) {
+        changed |= differ(box->min[i], parent->min[i][slot]) | differ(box->max[i], parent->max[i][slot]);
+    }
+    for (int i = 0; i < 3 && (always || changed != 0); ++i) {
+        parent->min[i][slot] = box->min[i];
+        parent->max[i][slot] = box->max[i];
+    }
+    return changed != 0;
+}
+
+/* Bring a marked node's box up to its parent, which is marked when that changes it. */
 static inline void lift(umb_node *nodes, const umb_bvh_marks *marks, umb_node_volumes *volumes, uint32_t number)
 {
     umb_node *node = &nodes[number];
@@ -451,14 +470,8 @@ static inline void lift(umb_node *nodes, const umb_bvh_marks *marks, umb_node_vo
         return;
     }
     umb_node *parent = &nodes[node->parent];
-    uint32_t slot = node->slot, changed = 0;
-    for (int i = 0; i < 3; ++i) {
-        float low = lowest_of(node->min[i]), high = highest_of(node->max[i]);
-        changed |= differ(low, parent->min[i][slot]) | differ(high, parent->max[i][slot]);
-        parent->min[i][slot] = low;
-        parent->max[i][slot] = high;
-    }
-    if (changed != 0 || refitted) {
+    umb_aabb box = bounds_of(node);
+    if (tell_parent(parent, node->slot, &box, true) || refitted) {
         umb_bvh_mark(marks, node->parent);
         if (is_large(marks)) {
             fetch(nodes, parent->parent); /* its turn is later */
@@ -482,33 +495,118 @@ void umb_bvh_lift_marked(umb_node *nodes, const umb_bvh_marks *marks, umb_node_v
     }
 }
 
-/* How many moves ahead nodes are asked for: all that is looked at before is in the caches. */
-#define AHEAD 8
+/* How many moves ahead nodes are asked for: all that is looked at before is in the caches. A power of two. */
+#define AHEAD 8u
+/* Of more moves than one for so many nodes, many are in the same ones. */
+#define SPREAD 4
+
+static inline __attribute__((always_inline)) void fetch_item(const uint32_t *places, const umb_committed *scene, uint32_t i)
+{
+    if (i < scene->moved_count) {
+        __builtin_prefetch(&places[scene->moved[i]]);
+        __builtin_prefetch(&scene->objects[scene->moved[i]].bounds);
+    }
+}
+
+static inline __attribute__((always_inline)) void fetch_place(const umb_node *nodes, const uint32_t *places,
+                                                              const umb_committed *scene, uint32_t i)
+{
+    if (i < scene->moved_count) {
+        uint32_t place = places[scene->moved[i]];
+        fetch(nodes, place != UMB_NONE ? place / UMB_NODE_WIDTH : 0);
+    }
+}
+
+/* Give a moved item its box. Returns its node, UMB_NONE: it has none. */
+static inline uint32_t set_moved(umb_node *nodes, const uint32_t *places, const umb_committed *scene, uint32_t i)
+{
+    uint32_t place = places[scene->moved[i]], node = place / UMB_NODE_WIDTH;
+    if (place == UMB_NONE) {
+        return UMB_NONE;
+    }
+    const umb_aabb *box = &scene->objects[scene->moved[i]].bounds;
+    for (int k = 0; k < 3; ++k) {
+        nodes[node].min[k][place % UMB_NODE_WIDTH] = box->min[k];
+        nodes[node].max[k][place % UMB_NODE_WIDTH] = box->max[k];
+    }
+    return node;
+}
+
+/* What a parent is to be told of a node. */
+typedef struct message {
+    umb_aabb box;
+    uint32_t parent, slot; /* UMB_NONE: nothing */
+} message;
+
+static inline message message_of(umb_node *nodes, uint32_t number)
+{
+    if (number == UMB_NONE) {
+        return (message){.parent = UMB_NONE};
+    }
+    umb_node *node = &nodes[number];
+    if (node->count < UMB_NODE_WIDTH) {
+        umb_node_pad(node);
+    }
+    fetch(nodes, node->parent);
+    return (message){.box = bounds_of(node), .parent = node->parent, .slot = node->slot};
+}
+
+static inline void deliver(umb_node *nodes, const umb_bvh_marks *marks, const message *m)
+{
+    if (m->parent != UMB_NONE && tell_parent(&nodes[m->parent], m->slot, &m->box, false)) {
+        umb_bvh_mark(marks, m->parent);
+        fetch(nodes, nodes[m->parent].parent);
+    }
+}
+
+/* In a large tree few nodes hold two that moved, and a node looked at again later is one to wait for again: so parents are told
+ * at once. A move goes through four stages, each of which asks for what the next one looks at, AHEAD moves later: the item,
+ * its node, its box there, the parent. Of two messages from one node the later one, which is right, comes later. */
+static void refit_spread(umb_node *nodes, const umb_bvh_marks *marks, const uint32_t *places, const umb_committed *scene)
+{
+    message told[AHEAD];
+    uint32_t count = scene->moved_count;
+    for (uint32_t i = 0; i < AHEAD; ++i) {
+        told[i].parent = UMB_NONE;
+        fetch_item(places, scene, i);
+        fetch_item(places, scene, i + AHEAD);
+    }
+    for (uint32_t i = 0; i < AHEAD; ++i) {
+        fetch_place(nodes, places, scene, i);
+    }
+    for (uint32_t i = 0; i < count; ++i) {
+        fetch_item(places, scene, i + 2 * AHEAD);
+        fetch_place(nodes, places, scene, i + AHEAD);
+        deliver(nodes, marks, &told[i % AHEAD]);
+        told[i % AHEAD] = message_of(nodes, set_moved(nodes, places, scene, i));
+    }
+    for (uint32_t i = count; i < count + AHEAD; ++i) {
+        deliver(nodes, marks, &told[i % AHEAD]);
+    }
+}
+
+static void refit_dense(umb_node *nodes, const umb_bvh_marks *marks, const uint32_t *places, const umb_committed *scene)
+{
+    bool large = is_large(marks);
+    for (uint32_t i = 0; i < scene->moved_count; ++i) {
+        if (large) {
+            fetch_item(places, scene, i + 2 * AHEAD);
+            fetch_place(nodes, places, scene, i + AHEAD);
+        }
+        uint32_t node = set_moved(nodes, places, scene, i);
+        if (node != UMB_NONE) {
+            umb_bvh_mark(marks, node);
+        }
+    }
+}
 
 void umb_bvh_refit_moved(umb_node *nodes, umb_bvh_marks *marks, const uint32_t *places,
                          const umb_committed *scene, umb_node_volumes *volumes)
 {
-    bool large = is_large(marks);
-    for (uint32_t i = 0; i < scene->moved_count; ++i) {
-        uint32_t place = places[scene->moved[i]];
-        if (large && i + 2 * AHEAD < scene->moved_count) {
-            __builtin_prefetch(&places[scene->moved[i + 2 * AHEAD]]);
-            __builtin_prefetch(&scene->objects[scene->moved[i + 2 * AHEAD]].bounds);
-        }
-        if (large && i + AHEAD < scene->moved_count) {
-            uint32_t next = places[scene->moved[i + AHEAD]];
-            fetch(nodes, next != UMB_NONE ? next / UMB_NODE_WIDTH : 0);
-        }
-        if (place != UMB_NONE) {
-            const umb_aabb *box = &scene->objects[scene->moved[i]].bounds;
-            umb_node *node = &nodes[place / UMB_NODE_WIDTH];
-            uint32_t slot = place % UMB_NODE_WIDTH;
-            set_slot(node, slot, box->min, box->max, node->ref[slot]);
-            umb_bvh_mark(marks, place / UMB_NODE_WIDTH);
-            if (large) {
-                fetch(nodes, node->parent);
-            }
-        }
+    if (is_large(marks) && volumes == NULL && scene->moved_count < marks->node_words * (64 / SPREAD)) {
+        refit_spread(nodes, marks, places, scene);
+    } else {
+        refit_dense(nodes, marks, places, scene);
     }
     umb_bvh_lift_marked(nodes, marks, volumes);
 }

@@ -9,6 +9,7 @@
 #define SAMPLE 16
 #define LEAST_SAMPLE 64
 #define CHANGES_A_SAMPLE 8
+#define SAMPLE_AHEAD 4 /* how many looks ahead a node is asked for */
 /* The work is done in about so many commits, but for small trees. */
 #define COMMITS 24
 #define LEAST_WORK 8192
@@ -49,6 +50,10 @@ static double sample_growth(const umb_tree_edit *e, uint32_t phase, uint32_t ste
     double now = 0.0, then = 0.0;
     for (uint32_t k = phase % step; k < e->node_count; k += step) {
         const umb_node *node = &e->nodes[k];
+        uint64_t later = k + (uint64_t)SAMPLE_AHEAD * step;
+        for (size_t i = 0; i < sizeof *node && step > SAMPLE && later < e->node_count; i += 64) {
+            __builtin_prefetch((const char *)&e->nodes[later] + i);
+        }
         if (node->count > 0) {
             now += (double)umb_tree_edit_area(node) * node->count;
             then += (double)node->built * node->count;

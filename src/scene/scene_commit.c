@@ -284,6 +284,7 @@ static void commit_moved(umb_scene *scene)
         object->mover = slot->mover;
         object->exact = umb_motion_is_exact(scene, slot);
         object->box = is_box(object, p);
+        bool masked = object->mask != slot->mask;
         object->mask = slot->mask;
         if (object->occluder != UMB_NONE) {
             umb_occluder *occluder = &scene->committed_occluders[object->occluder];
@@ -292,7 +293,9 @@ static void commit_moved(umb_scene *scene)
             occluder->identity = p->identity;
             occluder->mirrored = p->mirrored;
             occluder->moves = moves(scene, slot);
-            scene->committed_masks[object->occluder] = slot->mask;
+            if (masked) { /* most moves change none, and each mask is a cache line of its own */
+                scene->committed_masks[object->occluder] = slot->mask;
+            }
         }
         scene->committed_moved[count] = scene->touched[i];
         count += object->live ? 1u : 0u;
