@@ -33,6 +33,42 @@ static bool beside(const float (*p)[3], const uint32_t s[3], const uint32_t t[3]
     return !(front && back);
 }
 
+static bool has_corner(const uint32_t s[3], uint32_t v)
+{
+    return v == s[0] || v == s[1] || v == s[2];
+}
+
+/* The segment from a to b surely meets triangle s nowhere but in corners of its own that they are. */
+static bool edge_misses(const float (*p)[3], const uint32_t s[3], uint32_t a, uint32_t b)
+{
+    bool own_a = has_corner(s, a), own_b = has_corner(s, b), left = false, right = false;
+    int side_a = own_a ? 0 : umb_orient(p[s[0]], p[s[1]], p[s[2]], p[a]);
+    int side_b = own_b ? 0 : umb_orient(p[s[0]], p[s[1]], p[s[2]], p[b]);
+    if (side_a == 0 && side_b == 0) {
+        return own_a && own_b;
+    }
+    if (side_a * side_b > 0 || own_a || own_b) {
+        return true;
+    }
+    for (int k = 0; k < 3; ++k) {
+        int turn = umb_orient(p[a], p[b], p[s[k]], p[s[(k + 1) % 3]]);
+        left = left || turn > 0;
+        right = right || turn < 0;
+    }
+    return left && right;
+}
+
+/* If triangles cross, an edge of one meets the other. */
+static bool edges_miss(const float (*p)[3], const uint32_t s[3], const uint32_t t[3])
+{
+    for (int k = 0; k < 3; ++k) {
+        if (!edge_misses(p, s, t[k], t[(k + 1) % 3])) {
+            return false;
+        }
+    }
+    return true;
+}
+
 typedef struct box {
     float min[3], max[3];
 } box;
@@ -61,7 +97,8 @@ static bool none_cross(const umb_mesh *m, const float (*p)[3])
         boxes[i] = box_of(p, m->triangles[i]);
         for (uint32_t k = 0; k < i; ++k) {
             const uint32_t *s = m->triangles[i], *t = m->triangles[k];
-            if (!boxes_apart(&boxes[i], &boxes[k]) && !beside(p, s, t) && !beside(p, t, s)) {
+            if (!boxes_apart(&boxes[i], &boxes[k]) && !beside(p, s, t) && !beside(p, t, s) &&
+                !(edges_miss(p, s, t) && edges_miss(p, t, s))) {
                 return false;
             }
         }
@@ -69,7 +106,7 @@ static bool none_cross(const umb_mesh *m, const float (*p)[3])
     return true;
 }
 
-static uint32_t root_of(uint8_t *parent, uint32_t i)
+static uint32_t root_of(uint16_t *parent, uint32_t i)
 {
     while (parent[i] != i) {
         i = parent[i];
@@ -90,13 +127,13 @@ static double volume_under(const float (*p)[3], const uint32_t t[3])
 static bool volumes_positive(const umb_occluder *o, const float (*p)[3])
 {
     const umb_mesh *m = o->mesh;
-    uint8_t parent[UMB_CLOSED_SOLID_MOST];
+    uint16_t parent[UMB_CLOSED_SOLID_MOST];
     double volume[UMB_CLOSED_SOLID_MOST] = {0.0}, size = 0.0;
     for (uint32_t i = 0; i < m->triangle_count; ++i) {
-        parent[i] = (uint8_t)i;
+        parent[i] = (uint16_t)i;
     }
     for (uint32_t i = 0; i < m->edge_count; ++i) {
-        parent[root_of(parent, m->edges[i].f0)] = (uint8_t)root_of(parent, m->edges[i].f1);
+        parent[root_of(parent, m->edges[i].f0)] = (uint16_t)root_of(parent, m->edges[i].f1);
     }
     for (int k = 0; k < 3; ++k) {
         size = fmax(size, (double)o->bounds.max[k] - o->bounds.min[k]);

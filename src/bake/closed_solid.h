@@ -5,7 +5,7 @@
 #include "scene/scene.h"
 
 /* At most so many triangles are looked at in pairs. */
-#define UMB_CLOSED_SOLID_MOST 128
+#define UMB_CLOSED_SOLID_MOST 512
 
 /* True if the occluder's blocking triangles (world positions: those of its vertices) are closed, none two-sided, no two of
  * them pass through one another, and every connected part encloses a positive volume. Then the winding number is nowhere

@@ -51,6 +51,7 @@ void umb_region_destroy(umb_region *region)
         return;
     }
     umb_allocator a = region->allocator;
+    umb_solid_tree_free(&region->solid_tree, &a);
     umb_solids_free(&region->solids);
     umb_pieces_free(&region->pieces);
     for (int i = 0; i < UMB_REGION_MAPS; ++i) {

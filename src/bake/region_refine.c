@@ -1,184 +1,23 @@
-/* Refinement: what the maps left is asked about once more, in all directions alike (docs/conservative.md, T5). A beam is
- * all segments from a part of the cell to a part of an object. One body that meets every segment between the corners of
- * both parts meets them all; else the larger part is cut in two. A segment that no body meets ends the search: then
- * nothing can be proved. */
+/* Refinement: what the maps left is asked about once more, in all directions alike (docs/conservative.md, T5): the box of each
+ * object first, then, where that shows something, its triangles. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "beam.h"
+#include "geometry/transform.h"
 #include "region_state.h"
 #include "solid_inner.h"
 
-#define MOST_BODIES 128
 #define DEFAULT_EFFORT 512
 #define CHUNK 16
-/* Parts are larger than what they stand for by this much of the reach, hundreds of times what sums of their corners
- * lose on the way down; none is cut whose halves would overlap by less than that. */
-#define PART_MARGIN 0x1p-44
-#define LEAST_PART 0x1p-19
-
-/* A part of the cell or of an object: a middle and three half axes. */
-typedef struct part {
-    double middle[3], axes[3][3];
-} part;
-
-typedef struct search {
-    const umb_solids *solids;
-    uint32_t effort; /* left */
-} search;
-
-static void corners_of(const part *p, double out[8][3])
-{
-    for (int c = 0; c < 8; ++c) {
-        for (int k = 0; k < 3; ++k) {
-            double x = p->middle[k];
-            for (int a = 0; a < 3; ++a) {
-                x += (c >> a & 1) != 0 ? p->axes[a][k] : -p->axes[a][k];
-            }
-            out[c][k] = x;
-        }
-    }
-}
-
-static double length_squared(const double v[3])
-{
-    return v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
-}
-
-static int longest_axis(const part *p, double *length)
-{
-    int longest = 0;
-    for (int a = 1; a < 3; ++a) {
-        longest = length_squared(p->axes[a]) > length_squared(p->axes[longest]) ? a : longest;
-    }
-    *length = length_squared(p->axes[longest]);
-    return longest;
-}
-
-/* Half of a part along an axis; halves overlap by far more than rounding can part them. */
-static part half_of(const part *p, int axis, double side)
-{
-    part h = *p;
-    for (int k = 0; k < 3; ++k) {
-        h.axes[axis][k] = 0.5 * p->axes[axis][k] * (1.0 + 0x1p-24);
-        h.middle[k] = p->middle[k] + side * 0.5 * p->axes[axis][k];
-    }
-    return h;
-}
-
-static void box_of(const double corners[8][3], double min[3], double max[3])
-{
-    for (int k = 0; k < 3; ++k) {
-        min[k] = max[k] = corners[0][k];
-        for (int c = 1; c < 8; ++c) {
-            min[k] = corners[c][k] < min[k] ? corners[c][k] : min[k];
-            max[k] = corners[c][k] > max[k] ? corners[c][k] : max[k];
-        }
-    }
-}
-
-typedef struct shaft {
-    double min[2][3], max[2][3]; /* boxes around both ends */
-} shaft;
-
-/* True if the box is surely beside the hull of both ends, as seen along one of the axes: only saves work. */
-static bool beside(const shaft *s, const umb_aabb *b)
-{
-    for (int k = 0; k < 3; ++k) {
-        if (b->max[k] < fmin(s->min[0][k], s->min[1][k]) || b->min[k] > fmax(s->max[0][k], s->max[1][k])) {
-            return true;
-        }
-    }
-    for (int i = 0; i < 3; ++i) {
-        int j = (i + 1) % 3;
-        for (int c = 0; c < 4; ++c) {
-            double x0 = (c & 1) != 0 ? s->max[0][i] : s->min[0][i], y0 = (c & 2) != 0 ? s->max[0][j] : s->min[0][j];
-            double x1 = (c & 1) != 0 ? s->max[1][i] : s->min[1][i], y1 = (c & 2) != 0 ? s->max[1][j] : s->min[1][j];
-            /* The normal that points out of both ends at this corner. */
-            double nx = y1 - y0, ny = x0 - x1, sx = (c & 1) != 0 ? 1.0 : -1.0, sy = (c & 2) != 0 ? 1.0 : -1.0;
-            if (nx * sx < 0.0 || ny * sy < 0.0) {
-                nx = -nx;
-                ny = -ny;
-            }
-            if (nx * sx < 0.0 || ny * sy < 0.0 || (nx == 0.0 && ny == 0.0)) {
-                continue;
-            }
-            double bx = nx > 0.0 ? b->min[i] : b->max[i], by = ny > 0.0 ? b->min[j] : b->max[j];
-            if (nx * (bx - x0) + ny * (by - y0) > 0.0) {
-                return true;
-            }
-        }
-    }
-    return false;
-}
-
-/* True if every segment from a to b is blocked. bodies: those that may meet one. Whatever of the 64 segments between
- * corners no body meets will still be there in some part, however small: then it is no use to go on. */
-static bool beam_blocked(search *s, const part *a, const part *b, const uint32_t *bodies, uint32_t count)
-{
-    double from[8][3], to[8][3];
-    uint32_t kept[MOST_BODIES], n = 0, most = 0, best = 0;
-    uint64_t blocked = 0;
-    shaft ends;
-    if (s->effort == 0) {
-        return false;
-    }
-    s->effort -= 1;
-    corners_of(a, from);
-    corners_of(b, to);
-    box_of((const double(*)[3])from, ends.min[0], ends.max[0]);
-    box_of((const double(*)[3])to, ends.min[1], ends.max[1]);
-    for (uint32_t i = 0; i < count; ++i) {
-        const umb_solid *body = &s->solids->items[bodies[i]];
-        if (beside(&ends, &body->bounds)) {
-            continue;
-        }
-        uint64_t own = umb_solid_blocks(s->solids, body, (const double(*)[3])from, (const double(*)[3])to);
-        if (own == UINT64_MAX) {
-            return true;
-        }
-        uint32_t weight = (uint32_t)__builtin_popcountll(own);
-        best = weight > most ? n : best;
-        most = weight > most ? weight : most;
-        blocked |= own;
-        kept[n++] = bodies[i];
-    }
-    if (blocked != UINT64_MAX) {
-        return false;
-    }
-    uint32_t first = kept[0]; /* what blocks most is asked first */
-    kept[0] = kept[best];
-    kept[best] = first;
-    double la, lb;
-    int axis_a = longest_axis(a, &la), axis_b = longest_axis(b, &lb);
-    double least = LEAST_PART * s->solids->reach;
-    if (!(fmax(la, lb) > least * least)) {
-        return false;
-    }
-    for (int side = -1; side <= 1; side += 2) {
-        part half = la > lb ? half_of(a, axis_a, side) : half_of(b, axis_b, side);
-        if (!beam_blocked(s, la > lb ? &half : a, la > lb ? b : &half, kept, n)) {
-            return false;
-        }
-    }
-    return true;
-}
+#define MOST_TRIANGLES 64 /* of an object that is asked about triangle by triangle */
 
 /* ---- objects ---------------------------------------------------------------------------------- */
 
-static part part_of_box(const double min[3], const double max[3], double more)
-{
-    part p = {{0.0}, {{0.0}}};
-    for (int k = 0; k < 3; ++k) {
-        p.middle[k] = 0.5 * (min[k] + max[k]);
-        p.axes[k][k] = fmax(max[k] - p.middle[k], p.middle[k] - min[k]) + more;
-    }
-    return p;
-}
-
 /* The shape's box where it stands, if its axes stay at right angles; rounding of world vertices moves them by less than
  * `more` along each. Else the object's bounds. */
-static part part_of_object(const umb_object *o, double reach)
+static umb_beam_part part_of_object(const umb_object *o, double reach)
 {
     double more = 0x1p-22 * reach;
     double min[3], max[3];
@@ -186,11 +25,11 @@ static part part_of_object(const umb_object *o, double reach)
         min[k] = o->bounds.min[k];
         max[k] = o->bounds.max[k];
     }
-    part p = part_of_box(min, max, PART_MARGIN * reach);
+    umb_beam_part p = umb_beam_box(min, max, UMB_BEAM_MARGIN * reach);
     if (!o->refine || o->identity) {
         return p;
     }
-    part turned = {{0.0}, {{0.0}}};
+    umb_beam_part turned = {{0.0}, {{0.0}}};
     double lengths[3];
     for (int a = 0; a < 3; ++a) {
         double half = 0.5 * ((double)o->mesh->bounds.max[a] - o->mesh->bounds.min[a]);
@@ -199,7 +38,7 @@ static part part_of_object(const umb_object *o, double reach)
             turned.axes[a][k] = o->transform.m[k][a] * half;
             turned.middle[k] += o->transform.m[k][a] * centre + (a == 0 ? o->transform.m[k][3] : 0.0);
         }
-        lengths[a] = sqrt(length_squared(turned.axes[a]));
+        lengths[a] = umb_vec3_length(umb_vec3_from_double(turned.axes[a]));
     }
     for (int a = 0; a < 3; ++a) {
         const double *u = turned.axes[a], *v = turned.axes[(a + 1) % 3];
@@ -219,7 +58,7 @@ static part part_of_object(const umb_object *o, double reach)
 typedef struct refinement {
     umb_region *region;
     const umb_object *objects;
-    part cell;
+    umb_beam_part cell;
     double cell_min[3], cell_max[3];
     uint32_t effort;
     uint8_t *states; /* per object of the set: what came out */
@@ -227,27 +66,88 @@ typedef struct refinement {
 
 enum { STAYS = 0, HIDDEN = 1, UNDECIDED = 2 };
 
-static uint8_t decide(const refinement *f, const umb_object *o)
+/* The least rectangle around a triangle that has a side along one of its edges, and `more` of it in all directions. Sums
+ * here are right to 2^-48 of the reach where the triangle has an area to speak of; others have their box. */
+static umb_beam_part part_of_triangle(const double p[3][3], double more)
+{
+    double min[3], max[3], least = INFINITY;
+    for (int k = 0; k < 3; ++k) {
+        min[k] = fmin(p[0][k], fmin(p[1][k], p[2][k]));
+        max[k] = fmax(p[0][k], fmax(p[1][k], p[2][k]));
+    }
+    umb_beam_part best = umb_beam_box(min, max, more);
+    for (int e = 0; e < 3; ++e) {
+        umb_vec3 a = umb_vec3_from_double(p[e]), along = umb_vec3_sub(umb_vec3_from_double(p[(e + 1) % 3]), a);
+        umb_vec3 third = umb_vec3_sub(umb_vec3_from_double(p[(e + 2) % 3]), a);
+        double length = umb_vec3_length(along);
+        if (!(length > 1024.0 * more)) {
+            continue;
+        }
+        double at = umb_vec3_dot(along, third) / (length * length), low = fmin(0.0, at), high = fmax(1.0, at);
+        umb_vec3 out = umb_vec3_sub(third, umb_vec3_scale(along, at));
+        double height = umb_vec3_length(out), size = (high - low) * length * height;
+        if (!(height > 1024.0 * more) || !(size < least)) {
+            continue;
+        }
+        least = size;
+        umb_vec3 middle = umb_vec3_add(a, umb_vec3_add(umb_vec3_scale(along, 0.5 * (low + high)), umb_vec3_scale(out, 0.5)));
+        umb_vec3 axes[3] = {umb_vec3_scale(along, 0.5 * (high - low) + 2.0 * more / length),
+                            umb_vec3_scale(out, 0.5 + 2.0 * more / height),
+                            umb_vec3_scale(umb_vec3_cross(along, out), 2.0 * more / (length * height))};
+        best = (umb_beam_part){{middle.x, middle.y, middle.z}, {{axes[0].x, axes[0].y, axes[0].z},
+                               {axes[1].x, axes[1].y, axes[1].z}, {axes[2].x, axes[2].y, axes[2].z}}};
+    }
+    return best;
+}
+
+static uint8_t decide_part(const refinement *f, const umb_beam_part *target)
 {
     const umb_solids *solids = &f->region->solids;
-    part target = part_of_object(o, f->region->reach);
-    uint32_t bodies[MOST_BODIES], count = 0;
-    double to[8][3];
-    shaft ends;
-    corners_of(&target, to);
-    box_of((const double(*)[3])to, ends.min[1], ends.max[1]);
-    memcpy(ends.min[0], f->cell_min, sizeof ends.min[0]);
-    memcpy(ends.max[0], f->cell_max, sizeof ends.max[0]);
-    for (size_t i = 0; i < solids->count && count < MOST_BODIES; ++i) {
-        if (!beside(&ends, &solids->items[i].bounds)) {
-            bodies[count++] = (uint32_t)i;
+    uint32_t bodies[UMB_BEAM_BODIES];
+    double min[2][3], max[2][3];
+    umb_shaft shaft;
+    memcpy(min[0], f->cell_min, sizeof min[0]);
+    memcpy(max[0], f->cell_max, sizeof max[0]);
+    umb_beam_bounds(target, min[1], max[1]);
+    umb_shaft_make(&shaft, (const double(*)[3])min, (const double(*)[3])max);
+    uint32_t count = umb_solid_tree_find(&f->region->solid_tree, solids, &shaft, UMB_BEAM_BODIES, bodies);
+    umb_beam_search s = {solids, f->effort};
+    bool hidden = umb_beam_blocked(&s, &f->cell, target, bodies, count);
+    return hidden ? HIDDEN : s.effort == 0 ? UNDECIDED : STAYS;
+}
+
+/* All of its triangles, as the scene shows them. */
+static uint8_t decide_triangles(const refinement *f, const umb_object *o)
+{
+    const umb_mesh *m = o->mesh;
+    for (uint32_t t = 0; t < m->seen_count; ++t) {
+        double p[3][3];
+        for (int c = 0; c < 3; ++c) {
+            float w[3];
+            const float *v = m->positions[m->triangles[t][c]];
+            memcpy(w, v, sizeof w);
+            if (!o->identity) {
+                umb_transform_point(&o->transform, v, w);
+            }
+            for (int k = 0; k < 3; ++k) {
+                p[c][k] = w[k];
+            }
+        }
+        umb_beam_part target = part_of_triangle((const double(*)[3])p, UMB_BEAM_MARGIN * f->region->reach);
+        uint8_t state = decide_part(f, &target);
+        if (state != HIDDEN) {
+            return state;
         }
     }
-    search s = {solids, f->effort};
-    if (beam_blocked(&s, &f->cell, &target, bodies, count)) {
-        return HIDDEN;
-    }
-    return s.effort == 0 ? UNDECIDED : STAYS;
+    return HIDDEN;
+}
+
+static uint8_t decide(const refinement *f, const umb_object *o)
+{
+    umb_beam_part target = part_of_object(o, f->region->reach);
+    uint8_t state = decide_part(f, &target);
+    bool by_triangles = o->refine && o->mesh->seen_count <= MOST_TRIANGLES && (state == UNDECIDED || !o->mesh->box);
+    return state != HIDDEN && by_triangles ? decide_triangles(f, o) : state;
 }
 
 static void decide_chunk(void *data, uint32_t chunk)
@@ -273,6 +173,9 @@ static umb_result find_bodies(umb_region *r)
             result = umb_solids_add_inner(&r->solids, o, r->used[i], corners);
         }
     }
+    if (result == UMB_OK && !umb_solid_tree_build(&r->solid_tree, &r->allocator, &r->solids)) {
+        result = UMB_ERROR_MEMORY;
+    }
     return result;
 }
 
@@ -286,11 +189,8 @@ umb_result umb_region_decide(umb_region *r, uint32_t effort)
         umb_memory_free(&r->allocator, f.states, (size_t)a->pvs_count + 1);
         return UMB_ERROR_MEMORY;
     }
-    f.cell = part_of_box(r->query.min, r->query.max, PART_MARGIN * r->reach);
-    for (int k = 0; k < 3; ++k) {
-        f.cell_min[k] = f.cell.middle[k] - f.cell.axes[k][k];
-        f.cell_max[k] = f.cell.middle[k] + f.cell.axes[k][k];
-    }
+    f.cell = umb_beam_box(r->query.min, r->query.max, UMB_BEAM_MARGIN * r->reach);
+    umb_beam_bounds(&f.cell, f.cell_min, f.cell_max);
     umb_tasks_run(&r->tasks, decide_chunk, &f, (a->pvs_count + CHUNK - 1) / CHUNK);
     a->refined_count = a->stats.undecided = 0;
     for (uint32_t i = 0; i < a->pvs_count; ++i) {

@@ -5,7 +5,7 @@
 #include "index/tree.h"
 #include "pieces.h"
 #include "ray_map.h"
-#include "solid.h"
+#include "solid_tree.h"
 #include "umbrage/region.h"
 
 #define UMB_REGION_MAPS 8
@@ -37,6 +37,7 @@ struct umb_region {
     uint32_t *used; /* occluders that the walk found not hidden */
     size_t used_capacity, used_count;
     umb_solids solids; /* bodies of these, once there is something to refine */
+    umb_solid_tree solid_tree;
 
     uint32_t *pvs, *refined;
     size_t pvs_capacity, refined_capacity;

@@ -206,3 +206,22 @@ uint64_t umb_solid_blocks(const umb_solids *s, const umb_solid *body, const doub
     }
     return blocked;
 }
+
+bool umb_solid_meets(const umb_solids *s, const umb_solid *body, const double a[3], const double b[3])
+{
+    const double(*planes)[4] = (const double(*)[4])s->planes + body->first_plane;
+    double from = 0.0, to = 1.0;
+    for (uint32_t k = 0; k < body->plane_count; ++k) {
+        double va = value(planes[k], a), vb = value(planes[k], b);
+        if (va <= 0.0 && vb <= 0.0) {
+            continue;
+        }
+        if (va > 0.0 && vb > 0.0) {
+            return false;
+        }
+        double at = va / (va - vb);
+        from = va > 0.0 && at > from ? at : from;
+        to = va <= 0.0 && at < to ? at : to;
+    }
+    return from + 0x1p-48 <= to;
+}

@@ -10,7 +10,7 @@
 /* A convex part of what an occluder encloses. Its planes are moved inwards by what rounding may do, for points whose
  * coordinates are at most the reach that it was made for. */
 typedef struct umb_solid {
-    umb_aabb bounds; /* of the occluder's blocking vertices */
+    umb_aabb bounds; /* only to pass it over quickly */
     uint32_t occluder;
     uint32_t first_plane, plane_count;
     double inner[3]; /* a point well inside */
@@ -40,6 +40,9 @@ umb_result umb_solids_add(umb_solids *s, const umb_occluder *o, uint32_t number,
 
 /* Which of the 64 segments from the eight points of a to those of b surely meet the body: bit 8 i + j for a[i], b[j]. */
 uint64_t umb_solid_blocks(const umb_solids *s, const umb_solid *body, const double a[8][3], const double b[8][3]);
+
+/* The same of one segment. */
+bool umb_solid_meets(const umb_solids *s, const umb_solid *body, const double a[3], const double b[3]);
 
 /* The eight corners of a box. */
 void umb_box_corners(const double min[3], const double max[3], double out[8][3]);

@@ -11,7 +11,7 @@
 
 /* A face: triangles side by side in one plane. */
 typedef struct face {
-    uint8_t triangles[UMB_CLOSED_SOLID_MOST];
+    uint16_t triangles[UMB_CLOSED_SOLID_MOST];
     uint32_t count;
     double planes[MOST_PLANES][4]; /* its own, then one through each edge of its border: of length 1, outwards */
     uint32_t plane_count;
@@ -21,7 +21,8 @@ typedef struct inner {
     const umb_occluder *occluder;
     const umb_mesh *mesh;
     float p[UMB_CLOSED_SOLID_MOST][3];
-    uint8_t face_of[UMB_CLOSED_SOLID_MOST]; /* number of the face + 1 */
+    bool done[UMB_CLOSED_SOLID_MOST];    /* in a face that was looked at */
+    bool in_face[UMB_CLOSED_SOLID_MOST]; /* in the present one */
     double size, step; /* of the solid; planes are moved inwards by the step */
 } inner;
 
@@ -63,22 +64,65 @@ static bool coplanar(const inner *in, uint32_t s, uint32_t t)
     return umb_vec3_dot(normal_of(in, s), normal_of(in, t)) > 0.0;
 }
 
-static void collect(inner *in, uint32_t seed, uint8_t number, face *f)
+static void add_triangle(inner *in, face *f, uint32_t triangle)
 {
-    const umb_mesh *m = in->mesh;
-    f->count = 1;
-    f->triangles[0] = (uint8_t)seed;
-    in->face_of[seed] = number;
-    for (uint32_t i = 0; i < f->count; ++i) {
-        for (uint32_t e = 0; e < m->edge_count; ++e) {
-            uint32_t a = m->edges[e].f0, b = m->edges[e].f1;
-            uint32_t other = a == f->triangles[i] ? b : b == f->triangles[i] ? a : UMB_NONE;
-            if (other != UMB_NONE && in->face_of[other] == 0 && coplanar(in, seed, other)) {
-                in->face_of[other] = number;
-                f->triangles[f->count++] = (uint8_t)other;
+    in->in_face[triangle] = true;
+    f->triangles[f->count++] = (uint16_t)triangle;
+}
+
+static void begin_face(inner *in, face *f, uint32_t seed)
+{
+    memset(in->in_face, 0, sizeof in->in_face);
+    f->count = 0;
+    add_triangle(in, f, seed);
+}
+
+/* A triangle in the seed's plane on the other side of an edge of the face: UMB_NONE if there is none. */
+static uint32_t across(const inner *in, const face *f, const umb_edge *e)
+{
+    bool own0 = in->in_face[e->f0], own1 = in->in_face[e->f1];
+    uint32_t other = own0 ? e->f1 : e->f0;
+    return own0 != own1 && coplanar(in, f->triangles[0], other) ? other : UMB_NONE;
+}
+
+/* All of a flat part of the surface. */
+static void collect(inner *in, uint32_t seed, face *f)
+{
+    begin_face(in, f, seed);
+    for (uint32_t before = 0; before != f->count;) {
+        before = f->count;
+        for (uint32_t e = 0; e < in->mesh->edge_count; ++e) {
+            uint32_t other = across(in, f, &in->mesh->edges[e]);
+            if (other != UMB_NONE) {
+                add_triangle(in, f, other);
             }
         }
     }
+}
+
+/* The plane through an edge of the border is there already: edges of storeys above one another have one. */
+static bool has_plane(const inner *in, const face *f, const float a[3], const float b[3], const double plane[4])
+{
+    for (uint32_t k = 1; k < f->plane_count; ++k) {
+        const double *p = f->planes[k];
+        if (p[0] * plane[0] + p[1] * plane[1] + p[2] * plane[2] > 0.999 && fabs(value(p, a)) <= 0.125 * in->step &&
+            fabs(value(p, b)) <= 0.125 * in->step) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static bool all_behind(const inner *in, const face *f, const double plane[4])
+{
+    for (uint32_t i = 0; i < f->count; ++i) {
+        for (int k = 0; k < 3; ++k) {
+            if (value(plane, in->p[in->mesh->triangles[f->triangles[i]][k]]) > 0.25 * in->step) {
+                return false;
+            }
+        }
+    }
+    return true;
 }
 
 /* The planes of a face that is convex, as far as a step can tell. */
@@ -86,33 +130,55 @@ static bool find_planes(const inner *in, face *f)
 {
     const umb_mesh *m = in->mesh;
     umb_vec3 n = normal_of(in, f->triangles[0]);
-    uint8_t number = in->face_of[f->triangles[0]];
     f->plane_count = 0;
     if (!set_plane(n, in->p[m->triangles[f->triangles[0]][0]], f->planes[f->plane_count++])) {
         return false;
     }
     for (uint32_t e = 0; e < m->edge_count; ++e) {
-        bool own0 = in->face_of[m->edges[e].f0] == number, own1 = in->face_of[m->edges[e].f1] == number;
+        bool own0 = in->in_face[m->edges[e].f0], own1 = in->in_face[m->edges[e].f1];
         if (own0 == own1) {
             continue;
         }
         const float *a = in->p[m->edges[e].v0], *b = in->p[m->edges[e].v1];
         umb_vec3 along = umb_vec3_sub(umb_vec3_from_float(b), umb_vec3_from_float(a));
-        umb_vec3 out = umb_vec3_cross(along, n);
-        bool flip = own1 != in->occluder->mirrored;
-        if (f->plane_count == MOST_PLANES || !set_plane(umb_vec3_scale(out, flip ? -1.0 : 1.0), a, f->planes[f->plane_count])) {
+        umb_vec3 out = umb_vec3_scale(umb_vec3_cross(along, n), own1 != in->occluder->mirrored ? -1.0 : 1.0);
+        double plane[4];
+        if (!set_plane(out, a, plane)) {
             return false;
         }
-        for (uint32_t i = 0; i < f->count; ++i) {
-            for (int k = 0; k < 3; ++k) {
-                if (value(f->planes[f->plane_count], in->p[m->triangles[f->triangles[i]][k]]) > 0.25 * in->step) {
-                    return false;
-                }
-            }
+        if (has_plane(in, f, a, b, plane)) {
+            continue;
         }
-        f->plane_count += 1;
+        if (f->plane_count == MOST_PLANES || !all_behind(in, f, plane)) {
+            return false;
+        }
+        memcpy(f->planes[f->plane_count++], plane, sizeof plane);
     }
     return true;
+}
+
+/* Of a flat part that is not convex: what of it is, around the seed. */
+static bool grow(inner *in, uint32_t seed, face *f)
+{
+    begin_face(in, f, seed);
+    if (!find_planes(in, f)) {
+        return false;
+    }
+    for (uint32_t before = 0; before != f->count;) {
+        before = f->count;
+        for (uint32_t e = 0; e < in->mesh->edge_count; ++e) {
+            uint32_t other = across(in, f, &in->mesh->edges[e]);
+            if (other == UMB_NONE) {
+                continue;
+            }
+            add_triangle(in, f, other);
+            if (!find_planes(in, f)) {
+                in->in_face[other] = false;
+                f->count -= 1;
+            }
+        }
+    }
+    return find_planes(in, f);
 }
 
 /* All corners of a triangle lie beyond a plane that is moved inwards by a step. */
@@ -174,6 +240,25 @@ static void middle_of(const inner *in, const face *f, double depth, double out[3
     }
 }
 
+/* Of the face, and of it moved in so far; within those of the occluder. */
+static umb_aabb bounds_of(const inner *in, const face *f, double depth)
+{
+    umb_aabb box = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+    for (uint32_t i = 0; i < 3 * f->count; ++i) {
+        const float *p = in->p[in->mesh->triangles[f->triangles[i / 3]][i % 3]];
+        for (int k = 0; k < 3; ++k) {
+            float back = (float)(p[k] - depth * f->planes[0][k]);
+            box.min[k] = fminf(box.min[k], fminf(p[k], back));
+            box.max[k] = fmaxf(box.max[k], fmaxf(p[k], back));
+        }
+    }
+    for (int k = 0; k < 3; ++k) {
+        box.min[k] = fmaxf(box.min[k], in->occluder->bounds.min[k]);
+        box.max[k] = fminf(box.max[k], in->occluder->bounds.max[k]);
+    }
+    return box;
+}
+
 static umb_result add_body(umb_solids *s, const inner *in, const face *f, double depth, uint32_t number)
 {
     size_t first = s->plane_count, count = f->plane_count + 1u;
@@ -195,7 +280,7 @@ static umb_result add_body(umb_solids *s, const inner *in, const face *f, double
     if (!(winding(in, middle) > 0.9)) {
         return UMB_OK;
     }
-    s->items[s->count++] = (umb_solid){in->occluder->bounds, number, (uint32_t)first, (uint32_t)count,
+    s->items[s->count++] = (umb_solid){bounds_of(in, f, depth), number, (uint32_t)first, (uint32_t)count,
                                        {middle[0], middle[1], middle[2]}};
     s->plane_count = first + count;
     return UMB_OK;
@@ -230,19 +315,19 @@ umb_result umb_solids_add_inner(umb_solids *s, const umb_occluder *o, uint32_t n
     inner in;
     face f;
     umb_result result = UMB_OK;
-    uint8_t faces = 0;
     if (!begin(&in, s, o, box)) {
         return UMB_OK;
     }
     for (uint32_t t = 0; t < in.mesh->triangle_count && result == UMB_OK; ++t) {
-        if (in.face_of[t] != 0) {
+        if (in.done[t]) {
             continue;
         }
-        collect(&in, t, ++faces, &f);
-        if (!find_planes(&in, &f)) {
-            continue;
+        collect(&in, t, &f);
+        bool convex = find_planes(&in, &f) || grow(&in, t, &f);
+        for (uint32_t i = 0; i < f.count; ++i) {
+            in.done[f.triangles[i]] = true;
         }
-        double depth = depth_behind(&in, &f);
+        double depth = convex ? depth_behind(&in, &f) : 0.0;
         if (depth > 0x1p-6 * in.size) {
             result = add_body(s, &in, &f, depth, number);
         }

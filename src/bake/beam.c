@@ -1,0 +1,179 @@
+#include "beam.h"
+
+#include <math.h>
+#include <string.h>
+
+#define LEAST_PART 0x1p-19
+
+static void corners_of(const umb_beam_part *p, double out[8][3])
+{
+    for (int c = 0; c < 8; ++c) {
+        for (int k = 0; k < 3; ++k) {
+            double x = p->middle[k];
+            for (int a = 0; a < 3; ++a) {
+                x += (c >> a & 1) != 0 ? p->axes[a][k] : -p->axes[a][k];
+            }
+            out[c][k] = x;
+        }
+    }
+}
+
+static double length_squared(const double v[3])
+{
+    return v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+}
+
+static int longest_axis(const umb_beam_part *p, double *length)
+{
+    int longest = 0;
+    for (int a = 1; a < 3; ++a) {
+        longest = length_squared(p->axes[a]) > length_squared(p->axes[longest]) ? a : longest;
+    }
+    *length = length_squared(p->axes[longest]);
+    return longest;
+}
+
+/* Half of a part along an axis; halves overlap by far more than rounding can part them. */
+static umb_beam_part half_of(const umb_beam_part *p, int axis, double side)
+{
+    umb_beam_part h = *p;
+    for (int k = 0; k < 3; ++k) {
+        h.axes[axis][k] = 0.5 * p->axes[axis][k] * (1.0 + 0x1p-24);
+        h.middle[k] = p->middle[k] + side * 0.5 * p->axes[axis][k];
+    }
+    return h;
+}
+
+static void box_of(const double corners[8][3], double min[3], double max[3])
+{
+    for (int k = 0; k < 3; ++k) {
+        min[k] = max[k] = corners[0][k];
+        for (int c = 1; c < 8; ++c) {
+            min[k] = corners[c][k] < min[k] ? corners[c][k] : min[k];
+            max[k] = corners[c][k] > max[k] ? corners[c][k] : max[k];
+        }
+    }
+}
+
+void umb_beam_bounds(const umb_beam_part *p, double min[3], double max[3])
+{
+    double corners[8][3];
+    corners_of(p, corners);
+    box_of((const double(*)[3])corners, min, max);
+}
+
+umb_beam_part umb_beam_box(const double min[3], const double max[3], double more)
+{
+    umb_beam_part p = {{0.0}, {{0.0}}};
+    for (int k = 0; k < 3; ++k) {
+        p.middle[k] = 0.5 * (min[k] + max[k]);
+        p.axes[k][k] = fmax(max[k] - p.middle[k], p.middle[k] - min[k]) + more;
+    }
+    return p;
+}
+
+/* What of a beam's 64 segments between corners bodies block. */
+typedef enum verdict { OPEN, BLOCKED, SHARED } verdict; /* SHARED: all are, but by no single body */
+
+typedef struct looked_at {
+    const umb_solids *solids;
+    double from[8][3], to[8][3];
+    uint64_t own[UMB_BEAM_BODIES]; /* segments that each body blocks */
+    bool known[UMB_BEAM_BODIES];   /* own is */
+} looked_at;
+
+static bool blocks_segment(const looked_at *l, const uint32_t *bodies, uint32_t i, uint32_t segment)
+{
+    return l->known[i] ? (l->own[i] >> segment & 1) != 0
+                       : umb_solid_meets(l->solids, &l->solids->items[bodies[i]], l->from[segment >> 3], l->to[segment & 7]);
+}
+
+/* One segment after another: who blocks it is asked about the others too. Most of what can be seen shows in the first
+ * few. Kept bodies come in the order of what they block. */
+static verdict look(looked_at *l, uint32_t *bodies, uint32_t count)
+{
+    uint64_t blocked = 0;
+    uint32_t best = 0, weight = 0;
+    memset(l->known, 0, sizeof l->known);
+    for (uint32_t n = 0; n < 64; ++n) {
+        uint32_t segment = n * 37 & 63, i = 0; /* corners far apart first */
+        if ((blocked >> segment & 1) != 0) {
+            continue;
+        }
+        while (i < count && !blocks_segment(l, bodies, i, segment)) {
+            ++i;
+        }
+        if (i == count) {
+            return OPEN;
+        }
+        l->known[i] = true;
+        l->own[i] = umb_solid_blocks(l->solids, &l->solids->items[bodies[i]], (const double(*)[3])l->from,
+                                     (const double(*)[3])l->to) | UINT64_C(1) << segment;
+        if (l->own[i] == UINT64_MAX) {
+            return BLOCKED;
+        }
+        blocked |= l->own[i];
+        uint32_t own = (uint32_t)__builtin_popcountll(l->own[i]);
+        best = own > weight ? i : best;
+        weight = own > weight ? own : weight;
+    }
+    /* One that was not asked yet may do it alone. */
+    for (uint32_t i = 0; i < count; ++i) {
+        if (!l->known[i] && blocks_segment(l, bodies, i, 0) && blocks_segment(l, bodies, i, 63) &&
+            umb_solid_blocks(l->solids, &l->solids->items[bodies[i]], (const double(*)[3])l->from,
+                             (const double(*)[3])l->to) == UINT64_MAX) {
+            return BLOCKED;
+        }
+    }
+    uint32_t first = bodies[0];
+    bodies[0] = bodies[best];
+    bodies[best] = first;
+    return SHARED;
+}
+
+static __attribute__((noinline)) verdict look_at(const umb_solids *solids, const umb_beam_part *a, const umb_beam_part *b,
+                                                 const uint32_t *bodies, uint32_t count, uint32_t *kept, uint32_t *n)
+{
+    looked_at l = {.solids = solids};
+    double min[2][3], max[2][3];
+    umb_shaft shaft;
+    corners_of(a, l.from);
+    corners_of(b, l.to);
+    box_of((const double(*)[3])l.from, min[0], max[0]);
+    box_of((const double(*)[3])l.to, min[1], max[1]);
+    umb_shaft_make(&shaft, (const double(*)[3])min, (const double(*)[3])max);
+    *n = 0;
+    for (uint32_t i = 0; i < count; ++i) {
+        if (!umb_shaft_beside(&shaft, &solids->items[bodies[i]].bounds)) {
+            kept[(*n)++] = bodies[i];
+        }
+    }
+    return look(&l, kept, *n);
+}
+
+/* Whatever of the segments between corners no body meets will still be there in some part, however small: then it is no
+ * use to go on. */
+bool umb_beam_blocked(umb_beam_search *s, const umb_beam_part *a, const umb_beam_part *b, const uint32_t *bodies, uint32_t count)
+{
+    uint32_t kept[UMB_BEAM_BODIES], n;
+    if (s->effort == 0) {
+        return false;
+    }
+    s->effort -= 1;
+    verdict v = look_at(s->solids, a, b, bodies, count, kept, &n);
+    if (v != SHARED) {
+        return v == BLOCKED;
+    }
+    double la, lb, least = LEAST_PART * s->solids->reach;
+    int axis_a = longest_axis(a, &la), axis_b = longest_axis(b, &lb);
+    if (!(fmax(la, lb) > least * least)) {
+        return false;
+    }
+    for (int side = -1; side <= 1; side += 2) {
+        umb_beam_part half = la > lb ? half_of(a, axis_a, side) : half_of(b, axis_b, side);
+        if (!umb_beam_blocked(s, la > lb ? &half : a, la > lb ? b : &half, kept, n)) {
+            return false;
+        }
+    }
+    return true;
+}

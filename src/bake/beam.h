@@ -1,0 +1,33 @@
+/* Beams: all segments from a part of the cell to a part of an object, and whether bodies block them all
+ * (docs/conservative.md, T5). */
+#ifndef UMB_BEAM_H
+#define UMB_BEAM_H
+
+#include "shaft.h"
+#include "solid.h"
+
+/* A part of the cell or of an object: a middle and three half axes. */
+typedef struct umb_beam_part {
+    double middle[3], axes[3][3];
+} umb_beam_part;
+
+/* Parts are larger than what they stand for by this much of the reach, hundreds of times what sums of their corners
+ * lose on the way down; none is cut whose halves would overlap by less than that. */
+#define UMB_BEAM_MARGIN 0x1p-44
+
+#define UMB_BEAM_BODIES 256
+
+umb_beam_part umb_beam_box(const double min[3], const double max[3], double more);
+void umb_beam_bounds(const umb_beam_part *p, double min[3], double max[3]);
+
+typedef struct umb_beam_search {
+    const umb_solids *solids;
+    uint32_t effort; /* beams that may still be looked at */
+} umb_beam_search;
+
+/* True if every segment from a to b is blocked. bodies: those that may meet one, at most UMB_BEAM_BODIES. False with
+ * effort 0: not decided. */
+bool umb_beam_blocked(umb_beam_search *s, const umb_beam_part *a, const umb_beam_part *b, const uint32_t *bodies,
+                      uint32_t count);
+
+#endif
