@@ -10,7 +10,7 @@
 
 #include <cmocka.h>
 
-#include "occlusion/seen.h"
+#include "occlusion/hull.h"
 
 __extension__ typedef __int128 whole;
 
@@ -196,6 +196,153 @@ static void test_sides(void **state)
     }
 }
 
+/* ---- depth ---- */
+
+/* A plane that faces the viewer, by points whose coordinates are whole numbers of eighths from the eye. */
+typedef struct plane {
+    float at[3][3];
+    vec n;
+    whole h, along;
+} plane;
+
+static bool make_plane(const stand *s, plane *p)
+{
+    vec d[3], u, v;
+    for (int i = 0; i < 3; ++i) {
+        int at[3];
+        random_point(s, at, p->at[i]);
+        for (int k = 0; k < 3; ++k) {
+            d[i].c[k] = 8 * at[k] - s->eye[k];
+        }
+    }
+    for (int k = 0; k < 3; ++k) {
+        u.c[k] = d[2].c[k] - d[0].c[k];
+        v.c[k] = d[1].c[k] - d[0].c[k];
+    }
+    p->n = cross(u, v);
+    p->h = p->along = 0;
+    for (int k = 0; k < 3; ++k) {
+        p->h += p->n.c[k] * d[0].c[k];
+        p->along += p->n.c[k] * s->forward[k];
+    }
+    return s->parallel ? p->along > 0 : p->h > 0;
+}
+
+/* Both planes' depths along the line through the eye and the image, multiplied crosswise. */
+static vec depth_of(const stand *s, const plane *front, const plane *back)
+{
+    vec out;
+    for (int m = 0; m < 3; ++m) {
+        int i = (s->from.axis + 1 + m) % 3;
+        out.c[m] = !s->parallel ? front->h * back->n.c[m] - back->h * front->n.c[m]
+                   : m < 2      ? back->n.c[i] * front->along - front->n.c[i] * back->along
+                                : front->h * back->along - back->h * front->along;
+    }
+    for (int m = 0; m < 3 && s->parallel && s->forward[s->from.axis] < 0; ++m) {
+        out.c[m] = -out.c[m];
+    }
+    return out;
+}
+
+static void make_depth(const stand *s, const plane *front, const plane *back, umb_seen_depth *depth, umb_seen_line *line)
+{
+    umb_shadow_plane f, b;
+    umb_seen_vector n;
+    umb_shadow_plane_of(&s->from, front->at[0], front->at[1], front->at[2], &f);
+    umb_shadow_plane_of(&s->from, back->at[0], back->at[1], back->at[2], &b);
+    umb_hull_depth(&s->from, &f, &b, &n);
+    for (int i = 0; i < 3; ++i) {
+        depth->front[i] = front->at[i];
+        depth->back[i] = back->at[i];
+    }
+    umb_seen_line_depth(&n, depth, line);
+}
+
+static void check_depth(const stand *s, const lines *l, const plane p[3])
+{
+    umb_seen_depth depth[2];
+    umb_seen_line line[2];
+    vec n[2];
+    for (int i = 0; i < 2; ++i) {
+        n[i] = depth_of(s, &p[i], &p[i + 1]);
+        make_depth(s, &p[i], &p[i + 1], &depth[i], &line[i]);
+    }
+    for (int i = 0; i < 6; ++i) {
+        umb_seen_corner c;
+        umb_seen_corner_of(&l->line[i], &l->line[(i + 1) % 6], 1, &c);
+        int expected = sign_of_dot(n[0], cross(l->n[i], l->n[(i + 1) % 6]));
+        assert_int_equal(umb_seen_side(&s->from, &line[0], &c), expected);
+        assert_int_equal(umb_seen_side_exact(&s->from, &line[0], &c), expected);
+        umb_seen_corner_of(&line[0], &l->line[i], -1, &c);
+        expected = -sign_of_dot(l->n[0], cross(n[0], l->n[i]));
+        assert_int_equal(umb_seen_side(&s->from, &l->line[0], &c), expected);
+        assert_int_equal(umb_seen_side_exact(&s->from, &l->line[0], &c), expected);
+        assert_int_equal(umb_seen_side(&s->from, &line[0], &c), 0);
+        assert_int_equal(umb_seen_side_exact(&s->from, &line[0], &c), 0);
+        umb_seen_corner_of(&line[0], &line[1], 1, &c);
+        expected = sign_of_dot(l->n[i], cross(n[0], n[1]));
+        assert_int_equal(umb_seen_side(&s->from, &l->line[i], &c), expected);
+        assert_int_equal(umb_seen_side_exact(&s->from, &l->line[i], &c), expected);
+        assert_int_equal(umb_seen_side_exact(&s->from, &line[1], &c), 0);
+    }
+}
+
+/* Lines where planes are equally deep. */
+static void test_depth(void **state)
+{
+    (void)state;
+    uint32_t checked = 0;
+    for (uint32_t i = 0; i < rounds(20000); ++i) {
+        stand s = make_stand();
+        lines l;
+        plane p[3];
+        make_lines(&s, &l);
+        if (make_plane(&s, &p[0]) && make_plane(&s, &p[1]) && make_plane(&s, &p[2])) {
+            check_depth(&s, &l, p);
+            checked += 1;
+        }
+    }
+    assert_true(checked > rounds(20000) / 20);
+}
+
+static float far_or_near(void)
+{
+    return (float)ldexp(between(-8388607, 8388607), below(2) != 0 ? -13 : -94);
+}
+
+/* As far and as fine as numbers may be: the longest whole numbers have room, and what is turned round has the other sign. */
+static void test_longest(void **state)
+{
+    (void)state;
+    for (uint32_t i = 0; i < rounds(2000); ++i) {
+        umb_seen_from from;
+        double eye[3], forward[3];
+        for (int k = 0; k < 3; ++k) {
+            eye[k] = far_or_near() + ldexp(between(-8388607, 8388607), -94);
+            forward[k] = ldexp(between(-8388607, 8388607), -23) + ldexp(between(1, 8388607), -75);
+        }
+        umb_seen_prepare(&from, eye, forward, i % 2 != 0, 1023.0);
+        assert_true(from.exact);
+        plane p[6];
+        umb_seen_line line[3], turned;
+        umb_seen_depth depth[3], back;
+        const stand s = {.from = from};
+        for (int m = 0; m < 54; ++m) {
+            p[m / 9].at[m % 9 / 3][m % 3] = far_or_near();
+        }
+        for (int m = 0; m < 3; ++m) {
+            make_depth(&s, &p[2 * m], &p[2 * m + 1], &depth[m], &line[m]);
+        }
+        make_depth(&s, &p[1], &p[0], &back, &turned);
+        umb_seen_corner c;
+        umb_seen_corner_of(&line[1], &line[2], 1, &c);
+        int side = umb_seen_side_exact(&from, &line[0], &c);
+        assert_true(side != 0 && side != UMB_SEEN_UNKNOWN);
+        assert_int_equal(umb_seen_side(&from, &line[0], &c), side);
+        assert_int_equal(umb_seen_side_exact(&from, &turned, &c), -side);
+    }
+}
+
 /* Where coordinates are finer than the small unit a side may be unknown, and is never wrong. */
 static void test_too_fine(void **state)
 {
@@ -275,7 +422,8 @@ static void test_cuts(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_bigint), cmocka_unit_test(test_sides),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_bigint), cmocka_unit_test(test_sides), cmocka_unit_test(test_depth),
+                                       cmocka_unit_test(test_longest),
                                        cmocka_unit_test(test_too_fine), cmocka_unit_test(test_cuts)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

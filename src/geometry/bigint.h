@@ -1,11 +1,11 @@
-/* Whole numbers of up to 1,536 bits, for signs that nothing shorter can tell. */
+/* Whole numbers of up to 2,048 bits, for signs that nothing shorter can tell. */
 #ifndef UMB_BIGINT_H
 #define UMB_BIGINT_H
 
 #include <stdbool.h>
 #include <stdint.h>
 
-#define UMB_BIGINT_LIMBS 48
+#define UMB_BIGINT_LIMBS 64
 
 /* sign times the sum of limb[i] 2^(32 i); count is without leading zeros, 0 for 0. */
 typedef struct umb_bigint {

@@ -35,6 +35,7 @@ static const uint8_t FACES[3][2][4] = {
 
 static void find_bounds(umb_hull *h, const umb_shadow_viewer *v)
 {
+    h->flat = false;
     h->nearest = INFINITY;
     for (int k = 0; k < 3; ++k) {
         h->bounds.min[k] = h->bounds.max[k] = h->points[0][k];
@@ -85,6 +86,26 @@ static int see_axis(const umb_shadow_viewer *v, const umb_aabb *box, int axis)
     return s->eye[axis] < box->min[axis] ? 0 : s->eye[axis] > box->max[axis] ? 2 : 1;
 }
 
+/* The faces of a box without width, as seen: segments and points. Their planes are of points that lie apart. */
+static void add_flat_faces(umb_hull *h, const umb_shadow_viewer *v, const int states[3])
+{
+    float apart = ldexpf(1.0f, 103 - v->sight.shift); /* about half the reach */
+    h->flat = apart > 0.0f;
+    for (int k = 0; k < 3 && h->flat; ++k) {
+        if (states[k] != 1) {
+            float a[3] = {0.0f, 0.0f, 0.0f}, b[3], c[3];
+            a[k] = states[k] == 0 ? h->bounds.min[k] : h->bounds.max[k];
+            memcpy(b, a, sizeof b);
+            memcpy(c, a, sizeof c);
+            b[(k + (states[k] == 0 ? 2 : 1)) % 3] = apart;
+            c[(k + (states[k] == 0 ? 1 : 2)) % 3] = apart;
+            add_face(h, FACES[k][states[k] / 2], 4);
+            umb_shadow_plane_of(&v->sight, a, b, c, &h->faces[h->face_count - 1].plane);
+            h->faces[h->face_count - 1].ready = true;
+        }
+    }
+}
+
 bool umb_hull_points_of_box(umb_hull *h, const umb_shadow_viewer *v, const umb_aabb *box)
 {
     for (uint32_t i = 0; i < 8; ++i) {
@@ -119,6 +140,9 @@ bool umb_hull_of_box(umb_hull *h, const umb_shadow_viewer *v, const umb_aabb *bo
         if (states[k] != 1 && wide) { /* one without area is the edge of another */
             add_face(h, FACES[k][states[k] / 2], 4);
         }
+    }
+    if (h->face_count == 0) {
+        add_flat_faces(h, v, states);
     }
     return true;
 }

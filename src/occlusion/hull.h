@@ -26,6 +26,7 @@ typedef struct umb_hull {
     umb_seen_line lines[UMB_HULL_CORNERS];
     umb_seen_corner corners[UMB_HULL_CORNERS];
     uint32_t count; /* of corners */
+    bool flat; /* the polygon has no width: faces are edges of it */
     umb_hull_face faces[UMB_HULL_FACES];
     uint32_t face_count;
 } umb_hull;

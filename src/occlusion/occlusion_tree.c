@@ -7,7 +7,7 @@
 #include "geometry/orient.h"
 
 /* Corners of all fragments on the way down from a polygon, while it is inserted or asked about. */
-enum { ROOM = 640, MOST_CORNERS = UMB_SHADOW_LINES + 8, MOST_MEMBERS = 12, MOST_DEPTH = 1000, MOST_COVERS = 4, MOST_DETOURS = 6 };
+enum { ROOM = 640, MOST_CORNERS = UMB_SHADOW_LINES + 8, MOST_MEMBERS = 12, MOST_DEPTH = 1000, MOST_COVERS = 4, MOST_DETOURS = 64 };
 
 typedef struct polygon {
     umb_seen_corner *corners;
@@ -64,15 +64,16 @@ static uint32_t add_cover(umb_occlusion_tree *t, const uint32_t *members, uint32
 /* ---- fragments ------------------------------------------------------------------------------------ */
 
 typedef struct sides {
-    bool negative, positive, unknown;
+    bool negative, zero, positive, unknown;
 } sides;
 
 static sides find_sides(const umb_occlusion_tree *t, const polygon *p, const umb_seen_line *line, int8_t *out)
 {
-    sides s = {false, false, false};
+    sides s = {false, false, false, false};
     for (uint32_t i = 0; i < p->count; ++i) {
         int side = umb_seen_side(&t->shadows->viewer.sight, line, &p->corners[i]);
         s.negative = s.negative || side == -1;
+        s.zero = s.zero || side == 0;
         s.positive = s.positive || side == 1;
         s.unknown = s.unknown || side == UMB_SEEN_UNKNOWN;
         out[i] = (int8_t)side;
@@ -302,11 +303,14 @@ void umb_occlusion_tree_begin(umb_occlusion_tree *t, umb_shadows *shadows, bool 
 
 /* ---- asking --------------------------------------------------------------------------------------- */
 
+#define ALL_FACES UINT32_MAX
+
 typedef struct question {
     const umb_occlusion_tree *tree;
     umb_hull *hull;
-    uint32_t first_face, end_face; /* any of which may say that it is beyond an occluder */
+    uint32_t face;    /* that is asked about; ALL_FACES: the outline, and any of them may say that it is beyond an occluder */
     uint32_t detours; /* that may still be taken */
+    uint32_t again;   /* times that less than all of it was asked about anew */
     const umb_seen_corner *top;
     uint8_t beyond[UMB_OCCLUSION_TREE_SHADOWS]; /* the whole hull: 0 not asked, 1 yes, 2 no */
 } question;
@@ -314,7 +318,7 @@ typedef struct question {
 /* True if the part of the hull in a polygon is strictly beyond a plane, by one of its faces. */
 static bool part_beyond(const question *q, const polygon *p, const umb_shadow_plane *plane)
 {
-    for (uint32_t f = q->first_face; f < q->end_face; ++f) {
+    for (uint32_t f = 0; f < q->hull->face_count; ++f) {
         umb_seen_vector depth;
         const umb_shadow_viewer *v = &q->tree->shadows->viewer;
         umb_hull_depth(&v->sight, umb_hull_face_plane(q->hull, v, f), plane, &depth);
@@ -416,9 +420,90 @@ typedef struct detour {
 
 static umb_occlusion_answer filter(question *q, uint32_t ref, const polygon *p, const detour *other);
 
+/* A plane of a cover, and those after it. */
+typedef struct plane_at {
+    const umb_occlusion_cover *cover;
+    uint32_t member, plane;
+} plane_at;
+
+/* The next plane from here on that the hull is not wholly beyond; NULL: there is none. */
+static const umb_shadow_plane *find_plane(question *q, plane_at *at)
+{
+    const umb_shadows *s = q->tree->shadows;
+    for (; at->member < at->cover->count; ++at->member, at->plane = 0) {
+        uint32_t shadow = q->tree->members[at->cover->first + at->member];
+        if (!hull_beyond(q, shadow) && at->plane < s->items[shadow].plane_count) {
+            return &s->planes[s->items[shadow].first_plane + at->plane];
+        }
+    }
+    return NULL;
+}
+
+static bool face_hidden_by(question *q, plane_at at, const polygon *p, const detour *other);
+
+/* By one of the covers from ref on, or on the other side, at each place of the polygon. */
+static bool face_hidden(question *q, uint32_t ref, const polygon *p, const detour *other)
+{
+    if (is_open(ref)) {
+        return other != NULL && filter(q, other->ref, p, other->next) == UMB_OCCLUSION_HIDDEN;
+    }
+    return face_hidden_by(q, (plane_at){cover_of(q->tree, ref), 0, 0}, p, other);
+}
+
+/* What is left is an edge or a corner of what was asked about. If that is on the rim of the cell, what is beyond the rim may
+ * hide it. */
+static bool hidden_beside(question *q, const polygon *p)
+{
+    if (q->again == 2) {
+        return false;
+    }
+    q->again += 1;
+    bool hidden = filter(q, q->tree->root, p, NULL) == UMB_OCCLUSION_HIDDEN;
+    q->again -= 1;
+    return hidden;
+}
+
+/* Where the face is not beyond a plane, another cover must hide it; where it is, what is left of this one. */
+static bool face_hidden_by(question *q, plane_at at, const polygon *p, const detour *other)
+{
+    const umb_shadow_viewer *v = &q->tree->shadows->viewer;
+    const umb_shadow_plane *back = find_plane(q, &at), *front;
+    uint32_t next = at.cover->other;
+    if (back == NULL) {
+        return true;
+    }
+    front = umb_hull_face_plane(q->hull, v, q->face);
+    const umb_seen_depth depth = {{front->a, front->b, front->c}, {back->a, back->b, back->c}};
+    umb_seen_vector n;
+    umb_seen_line line;
+    int8_t side[MOST_CORNERS];
+    polygon part;
+    umb_hull_depth(&v->sight, front, back, &n);
+    umb_seen_line_depth(&n, &depth, &line);
+    sides s = find_sides(q->tree, p, &line, side);
+    at.plane += 1;
+    if (s.unknown || !s.positive) {
+        return face_hidden(q, next, p, other);
+    }
+    if (!s.negative && !s.zero) {
+        return face_hidden_by(q, at, p, other);
+    }
+    if ((s.negative && is_open(next) && other == NULL) || !cut(q->tree, p, &line, side, -1, q->top, &part)) {
+        return false;
+    }
+    if (!face_hidden(q, next, &part, other) && (s.negative || !hidden_beside(q, &part))) {
+        return false;
+    }
+    return cut(q->tree, p, &line, side, 1, q->top, &part) && face_hidden_by(q, at, &part, other);
+}
+
 static umb_occlusion_answer ask_cell(question *q, uint32_t ref, const polygon *p, const detour *other)
 {
-    umb_occlusion_answer answer = is_open(ref) ? UMB_OCCLUSION_OPEN : ask_cover(q, ref, p);
+    umb_occlusion_answer open = is_open(ref) ? UMB_OCCLUSION_OPEN : UMB_OCCLUSION_BEFORE;
+    if (q->face != ALL_FACES) {
+        return face_hidden(q, ref, p, other) ? UMB_OCCLUSION_HIDDEN : open;
+    }
+    umb_occlusion_answer answer = is_open(ref) ? open : ask_cover(q, ref, p);
     return answer != UMB_OCCLUSION_HIDDEN && other != NULL ? filter(q, other->ref, p, other->next) : answer;
 }
 
@@ -485,28 +570,21 @@ umb_occlusion_answer umb_occlusion_tree_ask(const umb_occlusion_tree *t, umb_hul
 {
     umb_seen_corner room[ROOM];
     umb_seen_line lines[4];
-    question q;
-    q.tree = t;
-    q.hull = hull;
-    q.first_face = 0;
-    q.end_face = hull->face_count;
-    q.detours = MOST_DETOURS;
-    q.top = room + ROOM;
+    question q = {.tree = t, .hull = hull, .face = ALL_FACES, .detours = MOST_DETOURS, .top = room + ROOM};
     memset(q.beyond, 0, t->shadows->count < UMB_OCCLUSION_TREE_SHADOWS ? t->shadows->count : UMB_OCCLUSION_TREE_SHADOWS);
     polygon p = {room, hull->count};
     memcpy(room, hull->corners, hull->count * sizeof *room);
     *start = descend(&q, *start, &p);
-    umb_occlusion_answer answer = filter(&q, *start, &p, NULL);
-    if (answer != UMB_OCCLUSION_BEFORE || hull->face_count < 2) {
+    umb_occlusion_answer answer = hull->flat ? UMB_OCCLUSION_BEFORE : filter(&q, *start, &p, NULL);
+    if (answer != UMB_OCCLUSION_BEFORE || hull->face_count == 0) {
         return answer;
     }
     for (uint32_t f = 0; f < hull->face_count; ++f) {
         /* Each is asked about by itself; if none is in doubt, all are hidden. */
-        q.first_face = f;
-        q.end_face = f + 1;
+        q.face = f;
         p.count = umb_hull_face_polygon(hull, &t->shadows->viewer, f, lines, room);
         q.detours = MOST_DETOURS;
-        umb_occlusion_answer face = filter(&q, *start, &p, NULL);
+        umb_occlusion_answer face = filter(&q, hull->flat ? t->root : *start, &p, NULL);
         if (face != UMB_OCCLUSION_HIDDEN) {
             return face;
         }

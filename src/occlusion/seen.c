@@ -113,6 +113,7 @@ void umb_seen_line_later(const float a[3], const float b[3], umb_seen_line *out)
     memcpy(out->a, a, sizeof out->a);
     memcpy(out->b, b, sizeof out->b);
     out->free = out->ready = false;
+    out->depth = NULL;
 }
 
 void umb_seen_line_through(const umb_seen_from *s, const float a[3], const float b[3], umb_seen_line *out)
@@ -133,6 +134,17 @@ void umb_seen_line_free(const double n[3], umb_seen_line *out)
     }
     out->size = size_of(&out->n);
     out->free = out->ready = true;
+    out->depth = NULL;
+}
+
+void umb_seen_line_depth(const umb_seen_vector *n, const umb_seen_depth *depth, umb_seen_line *out)
+{
+    memset(out->a, 0, sizeof out->a);
+    memset(out->b, 0, sizeof out->b);
+    out->n = *n;
+    out->size = size_of(n);
+    out->free = out->ready = true;
+    out->depth = depth;
 }
 
 void umb_seen_corner_at(const umb_seen_from *s, const float p[3], umb_seen_corner *out)
@@ -172,25 +184,43 @@ static bool whole_difference(const umb_seen_from *s, const float p[3], umb_bigin
     return true;
 }
 
-static void whole_cross_component(const umb_bigint a[3], const umb_bigint b[3], int k, umb_bigint *out)
+/* a x - b y */
+static void whole_determinant(const umb_bigint *a, const umb_bigint *x, const umb_bigint *b, const umb_bigint *y,
+                              umb_bigint *out)
 {
-    umb_bigint x, y;
-    int i = (k + 1) % 3, j = (k + 2) % 3;
-    umb_bigint_multiply(&a[i], &b[j], &x);
-    umb_bigint_multiply(&a[j], &b[i], &y);
-    umb_bigint_add(&x, &y, -1, out);
+    umb_bigint p, q;
+    umb_bigint_multiply(a, x, &p);
+    umb_bigint_multiply(b, y, &q);
+    umb_bigint_add(&p, &q, -1, out);
 }
 
 static void whole_cross(const umb_bigint a[3], const umb_bigint b[3], umb_bigint out[3])
 {
     for (int k = 0; k < 3; ++k) {
-        whole_cross_component(a, b, k, &out[k]);
+        int i = (k + 1) % 3, j = (k + 2) % 3;
+        whole_determinant(&a[i], &b[j], &a[j], &b[i], &out[k]);
     }
+}
+
+static void whole_dot(const umb_bigint a[3], const umb_bigint b[3], umb_bigint *out)
+{
+    umb_bigint product;
+    umb_bigint_multiply(&a[0], &b[0], out);
+    for (int k = 1; k < 3; ++k) {
+        umb_bigint_multiply(&a[k], &b[k], &product);
+        umb_bigint_add(out, &product, 1, out);
+    }
+}
+
+/* Whole numbers of 2^-104 as such of 2^-(shift + 104). */
+static bool find_unit(const umb_seen_from *s, umb_bigint *out)
+{
+    return s->shift >= 0 && umb_bigint_from_double(1.0, s->shift, out);
 }
 
 static bool whole_image(const umb_seen_from *s, const float p[3], umb_bigint out[3])
 {
-    umb_bigint d[3], x, y;
+    umb_bigint d[3];
     if (!s->exact || !whole_difference(s, p, d)) {
         return false;
     }
@@ -201,21 +231,71 @@ static bool whole_image(const umb_seen_from *s, const float p[3], umb_bigint out
     int k = s->axis;
     for (int n = 0; n < 2; ++n) {
         int i = (k + 1 + n) % 3;
-        umb_bigint_multiply(&d[i], &s->forward_whole[k], &x);
-        umb_bigint_multiply(&d[k], &s->forward_whole[i], &y);
-        umb_bigint_add(&x, &y, -1, &out[n]);
+        whole_determinant(&d[i], &s->forward_whole[k], &d[k], &s->forward_whole[i], &out[n]);
     }
     /* The first two are whole numbers of 2^-(shift + 104), and so must this be. */
     umb_bigint unit;
-    if (s->shift < 0 || !umb_bigint_from_double(1.0, s->shift, &unit)) {
+    if (!find_unit(s, &unit)) {
         return false;
     }
     umb_bigint_multiply(&s->forward_whole[k], &unit, &out[2]);
     return true;
 }
 
+/* n = (c - a) x (b - a) and h = n.(a - eye). */
+static bool whole_plane(const umb_seen_from *s, const float *const p[3], umb_bigint n[3], umb_bigint *h)
+{
+    umb_bigint at[3][3];
+    for (int i = 0; i < 3; ++i) {
+        if (!whole_difference(s, p[i], at[i])) {
+            return false;
+        }
+    }
+    for (int k = 0; k < 3; ++k) {
+        umb_bigint_add(&at[1][k], &at[0][k], -1, &at[1][k]);
+        umb_bigint_add(&at[2][k], &at[0][k], -1, &at[2][k]);
+    }
+    whole_cross(at[2], at[1], n);
+    whole_dot(n, at[0], h);
+    return true;
+}
+
+/* What umb_hull_depth() finds: with n, h of the front plane and N, H of the back one, h N - H n; parallel, with the sign of
+ * f_k, (N_i n.f - n_i N.f, N_j n.f - n_j N.f, h N.f - H n.f), whose first two lack one factor of the unit. */
+static bool whole_depth(const umb_seen_from *s, const umb_seen_depth *depth, umb_bigint out[3])
+{
+    umb_bigint front[3], back[3], h, far, along, far_along, unit, x;
+    if (!s->exact || !whole_plane(s, depth->front, front, &h) || !whole_plane(s, depth->back, back, &far)) {
+        return false;
+    }
+    if (!s->parallel) {
+        for (int k = 0; k < 3; ++k) {
+            whole_determinant(&h, &back[k], &far, &front[k], &out[k]);
+        }
+        return true;
+    }
+    if (!find_unit(s, &unit)) {
+        return false;
+    }
+    whole_dot(front, s->forward_whole, &along);
+    whole_dot(back, s->forward_whole, &far_along);
+    for (int m = 0; m < 2; ++m) {
+        int i = (s->axis + 1 + m) % 3;
+        whole_determinant(&back[i], &along, &front[i], &far_along, &x);
+        umb_bigint_multiply(&x, &unit, &out[m]);
+    }
+    whole_determinant(&h, &far_along, &far, &along, &out[2]);
+    for (int k = 0; k < 3 && s->forward[s->axis] < 0.0; ++k) {
+        out[k].sign = -out[k].sign;
+    }
+    return true;
+}
+
 static bool whole_line(const umb_seen_from *s, const umb_seen_line *line, umb_bigint out[3])
 {
+    if (line->depth != NULL) {
+        return whole_depth(s, line->depth, out);
+    }
     if (line->free) {
         const double *n = line->n.at;
         int exponent;
@@ -249,15 +329,11 @@ static bool whole_corner(const umb_seen_from *s, const umb_seen_corner *c, umb_b
 
 int umb_seen_side_exact(const umb_seen_from *s, const umb_seen_line *line, const umb_seen_corner *corner)
 {
-    umb_bigint n[3], v[3], sum, product;
+    umb_bigint n[3], v[3], sum;
     if (!whole_line(s, line, n) || !whole_corner(s, corner, v)) {
         return UMB_SEEN_UNKNOWN;
     }
-    umb_bigint_multiply(&n[0], &v[0], &sum);
-    for (int k = 1; k < 3; ++k) {
-        umb_bigint_multiply(&n[k], &v[k], &product);
-        umb_bigint_add(&sum, &product, 1, &sum);
-    }
+    whole_dot(n, v, &sum);
     return sum.sign * corner->sign;
 }
 

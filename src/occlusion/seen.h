@@ -40,11 +40,17 @@ typedef struct umb_seen_size {
     double most, off;
 } umb_seen_size;
 
+/* Two planes that face the viewer, by three points each, in the order in which (c - a) x (b - a) points away from it. */
+typedef struct umb_seen_depth {
+    const float *front[3], *back[3];
+} umb_seen_depth;
+
 typedef struct umb_seen_line {
     umb_seen_vector n;
     umb_seen_size size; /* of n */
     float a[3], b[3]; /* n is image(a) x image(b) */
-    bool free;        /* it is made of no points: n is exact */
+    const umb_seen_depth *depth; /* if not NULL, n is made of this: positive where front is the farther one */
+    bool free;        /* it is not made of a and b: without depth, n is exact */
     bool ready;       /* n is known; cutting finds it when it wants it */
 } umb_seen_line;
 
@@ -71,6 +77,8 @@ void umb_seen_line_through(const umb_seen_from *s, const float a[3], const float
 void umb_seen_line_later(const float a[3], const float b[3], umb_seen_line *out);
 /* The line of a linear function of q, which loses up to 2^-53 of its largest component. */
 void umb_seen_line_free(const double n[3], umb_seen_line *out);
+/* Where two planes are equally deep, n and its error given; depth stays with the caller. */
+void umb_seen_line_depth(const umb_seen_vector *n, const umb_seen_depth *depth, umb_seen_line *out);
 /* A corner at a point, without its edge. */
 void umb_seen_corner_at(const umb_seen_from *s, const float p[3], umb_seen_corner *out);
 /* A corner at sign first x second, without its edge. */

@@ -162,32 +162,48 @@ static bool make_face(const int eye[3], const int box_min[3], const int box_max[
     return true;
 }
 
-/* Take the shadow of occluder number `next` and of those after it from a piece; true if nothing is left. */
-static bool consumed(const piece *p, const face *f, const occluder *occluders, int next, int count)
+typedef struct clipping {
+    const face *face;
+    const occluder *occluders;
+    int count;
+} clipping;
+
+static bool consumed(const clipping *c, const piece *p, int next, int again);
+
+/* What is not beyond the plane of an occluder is left for those after it. If that is no more than an edge or a corner of what
+ * is, those before it may hide it too: edges belong to both sides of a cut. */
+static bool consumed_before(const clipping *c, const piece *inside, vec depth, int next, int again)
 {
-    if (next == count) {
+    bool partly = reaches(inside, depth, 1), rim = partly && !reaches(inside, depth, -1);
+    piece before = partly ? keep_side(inside, depth, -1) : *inside;
+    return consumed(c, &before, next, again) || (rim && again < 2 && consumed(c, &before, 0, again + 1));
+}
+
+/* Take the shadow of occluder number `next` and of those after it from a piece; true if nothing is left. */
+static bool consumed(const clipping *c, const piece *p, int next, int again)
+{
+    if (next == c->count) {
         return false;
     }
-    const occluder *o = &occluders[next];
+    const occluder *o = &c->occluders[next];
     piece inside = *p;
     for (int i = 0; i < o->count; ++i) {
         if (!reaches(&inside, o->edges[i], 1) && reaches(&inside, o->edges[i], -1)) {
-            return consumed(&inside, f, occluders, next + 1, count);
+            return consumed(c, &inside, next + 1, again);
         }
         if (reaches(&inside, o->edges[i], -1)) {
             piece outside = keep_side(&inside, o->edges[i], -1);
-            if (!consumed(&outside, f, occluders, next + 1, count)) {
+            if (!consumed(c, &outside, next + 1, again)) {
                 return false;
             }
             inside = keep_side(&inside, o->edges[i], 1);
         }
     }
-    vec depth = shorten(minus(times(o->n, f->h), times(f->n, o->h)));
+    vec depth = shorten(minus(times(o->n, c->face->h), times(c->face->n, o->h)));
     if (!reaches(&inside, depth, -1) && !reaches(&inside, depth, 0)) {
         return true;
     }
-    piece before = reaches(&inside, depth, 1) ? keep_side(&inside, depth, -1) : inside;
-    return consumed(&before, f, occluders, next + 1, count);
+    return consumed_before(c, &inside, depth, next + 1, again);
 }
 
 bool exact_shadows_hide(const exact_polygon *polygons, int count, const int eye[3], const int box_min[3],
@@ -201,7 +217,7 @@ bool exact_shadows_hide(const exact_polygon *polygons, int count, const int eye[
     for (int axis = 0; axis < 3 && all; ++axis) {
         face f;
         if (make_face(eye, box_min, box_max, axis, &f)) {
-            all = consumed(&f.outline, &f, occluders, 0, count);
+            all = consumed(&(clipping){&f, occluders, count}, &f.outline, 0, 0);
         }
     }
     free(occluders);
