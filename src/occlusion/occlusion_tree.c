@@ -7,7 +7,7 @@
 #include "geometry/orient.h"
 
 /* Corners of all fragments on the way down from a polygon, while it is inserted or asked about. */
-enum { ROOM = 640, MOST_CORNERS = UMB_SHADOW_LINES + 8, MOST_MEMBERS = 12, MOST_DEPTH = 1000, MOST_COVERS = 4, MOST_DETOURS = 64 };
+enum { ROOM = 640, MOST_CORNERS = UMB_SHADOW_LINES + 8, MOST_MEMBERS = 12, MOST_DEPTH = 1000, MOST_COVERS = 16, MOST_DETOURS = 64 };
 
 typedef struct polygon {
     umb_seen_corner *corners;
@@ -233,6 +233,7 @@ static uint32_t insert_in_cell(const seed *s, uint32_t ref, const polygon *p)
         nearer = nearer && all_behind(t, c, s->shadow, true);
     }
     if (!nearer && cover_of(t, ref)->length + 1 == MOST_COVERS) {
+        t->given_up += 1;
         return ref;
     }
     return plant(t, p, s->shadow, ref, nearer ? UMB_OCCLUSION_OPEN_CELL : ref);
@@ -439,6 +440,17 @@ static const umb_shadow_plane *find_plane(question *q, plane_at *at)
     return NULL;
 }
 
+/* 1: the face is all beyond a plane; -1: nothing of it is; 0: some is. */
+static int face_side(const question *q, const umb_shadow_plane *plane)
+{
+    const umb_hull_face *f = &q->hull->faces[q->face];
+    uint32_t beyond = 0;
+    for (uint32_t i = 0; i < f->count; ++i) {
+        beyond += umb_orient(plane->a, plane->b, plane->c, q->hull->points[f->loop[i]]) < 0;
+    }
+    return beyond == f->count ? 1 : beyond == 0 ? -1 : 0;
+}
+
 static bool face_hidden_by(question *q, plane_at at, const polygon *p, const detour *other);
 
 /* By one of the covers from ref on, or on the other side, at each place of the polygon. */
@@ -463,17 +475,14 @@ static bool hidden_beside(question *q, const polygon *p)
     return hidden;
 }
 
-/* Where the face is not beyond a plane, another cover must hide it; where it is, what is left of this one. */
-static bool face_hidden_by(question *q, plane_at at, const polygon *p, const detour *other)
+/* A polygon of which a part may be beyond a plane. Where it is not, another cover must hide it; where it is, what is left of
+ * this one. */
+static bool face_hidden_in_part(question *q, plane_at at, const umb_shadow_plane *back, const polygon *p, const detour *other)
 {
     const umb_shadow_viewer *v = &q->tree->shadows->viewer;
-    const umb_shadow_plane *back = find_plane(q, &at), *front;
-    uint32_t next = at.cover->other;
-    if (back == NULL) {
-        return true;
-    }
-    front = umb_hull_face_plane(q->hull, v, q->face);
+    const umb_shadow_plane *front = umb_hull_face_plane(q->hull, v, q->face);
     const umb_seen_depth depth = {{front->a, front->b, front->c}, {back->a, back->b, back->c}};
+    uint32_t next = at.cover->other;
     umb_seen_vector n;
     umb_seen_line line;
     int8_t side[MOST_CORNERS];
@@ -481,7 +490,6 @@ static bool face_hidden_by(question *q, plane_at at, const polygon *p, const det
     umb_hull_depth(&v->sight, front, back, &n);
     umb_seen_line_depth(&n, &depth, &line);
     sides s = find_sides(q->tree, p, &line, side);
-    at.plane += 1;
     if (s.unknown || !s.positive) {
         return face_hidden(q, next, p, other);
     }
@@ -495,6 +503,18 @@ static bool face_hidden_by(question *q, plane_at at, const polygon *p, const det
         return false;
     }
     return cut(q->tree, p, &line, side, 1, q->top, &part) && face_hidden_by(q, at, &part, other);
+}
+
+static bool face_hidden_by(question *q, plane_at at, const polygon *p, const detour *other)
+{
+    for (const umb_shadow_plane *plane = find_plane(q, &at); plane != NULL; plane = find_plane(q, &at)) {
+        int side = face_side(q, plane);
+        at.plane += 1;
+        if (side <= 0) {
+            return side < 0 ? face_hidden(q, at.cover->other, p, other) : face_hidden_in_part(q, at, plane, p, other);
+        }
+    }
+    return true;
 }
 
 static umb_occlusion_answer ask_cell(question *q, uint32_t ref, const polygon *p, const detour *other)
@@ -570,7 +590,13 @@ umb_occlusion_answer umb_occlusion_tree_ask(const umb_occlusion_tree *t, umb_hul
 {
     umb_seen_corner room[ROOM];
     umb_seen_line lines[4];
-    question q = {.tree = t, .hull = hull, .face = ALL_FACES, .detours = MOST_DETOURS, .top = room + ROOM};
+    question q; /* most of it stays as it is */
+    q.tree = t;
+    q.hull = hull;
+    q.face = ALL_FACES;
+    q.detours = MOST_DETOURS;
+    q.again = 0;
+    q.top = room + ROOM;
     memset(q.beyond, 0, t->shadows->count < UMB_OCCLUSION_TREE_SHADOWS ? t->shadows->count : UMB_OCCLUSION_TREE_SHADOWS);
     polygon p = {room, hull->count};
     memcpy(room, hull->corners, hull->count * sizeof *room);

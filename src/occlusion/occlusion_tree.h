@@ -46,7 +46,7 @@ typedef struct umb_occlusion_tree {
     uint32_t root;
     bool modified, ready;
     uint32_t planted;  /* fragments that covered a cell, or covered it from nearer */
-    uint32_t given_up; /* fragments that were left out because a side was unknown or room was short */
+    uint32_t given_up; /* fragments that were left out because a side was unknown, room was short or a cell had too many covers */
 } umb_occlusion_tree;
 
 /* What became of a question. */
@@ -65,8 +65,10 @@ void umb_occlusion_tree_begin(umb_occlusion_tree *t, umb_shadows *shadows, bool 
 /* Insert one shadow. Nearest first is best: what lies behind others is then left out. */
 void umb_occlusion_tree_insert(umb_occlusion_tree *t, uint32_t shadow);
 /* Ask about a hull, starting at a node (root, or what *start became in a question about something that holds this one):
- * first its outline, then, if only depth was in doubt, each of its faces. *start becomes the deepest node in one of
- * whose cells all of it lies. Threads: any number at once. */
+ * first its outline, then, if only depth was in doubt, each of its faces, cut where it passes through the planes of occluders.
+ * Boxes and triangles that the view does not cut are hidden if and only if each of their points is in a shadow of the tree
+ * and strictly beyond it (docs/conservative.md, 15). *start becomes the deepest node in one of whose cells all of it lies.
+ * Threads: any number at once. */
 umb_occlusion_answer umb_occlusion_tree_ask(const umb_occlusion_tree *t, umb_hull *hull, uint32_t *start);
 /* True if a point is surely in an open cell. */
 bool umb_occlusion_tree_open_at(const umb_occlusion_tree *t, const float p[3], uint32_t start);

@@ -6,6 +6,9 @@
 #include <math.h>
 #include <string.h>
 
+#include "geometry/expansion.h"
+#include "geometry/orient.h"
+
 #define U 0x1p-53
 #define PAD (1.0 + 0x1p-40)
 #define LEAST 0x1p-1000
@@ -344,16 +347,61 @@ static bool ends_at(const umb_seen_line *line, const float p[3])
     return same_point(line->a, p) || same_point(line->b, p);
 }
 
-static bool same_line(const umb_seen_line *a, const umb_seen_line *b)
+/* to - from by component, if each is a float. */
+static bool float_step(const float from[3], const float to[3], double out[3])
 {
-    return a == b || (!a->free && !b->free && ends_at(a, b->a) && ends_at(a, b->b) && !same_point(b->a, b->b));
+    bool all = true;
+    for (int k = 0; k < 3; ++k) {
+        double lost;
+        umb_two_sum(to[k], -(double)from[k], &out[k], &lost);
+        all = all && lost == 0.0 && (double)(float)out[k] == out[k];
+    }
+    return all;
 }
 
-/* Lines and corners made of the same points. */
+/* The point lies on the line in space, for sure: products of floats are exact in doubles. */
+static bool holds(const umb_seen_line *line, const float p[3])
+{
+    double d[3], e[3];
+    if (ends_at(line, p)) {
+        return true;
+    }
+    return float_step(line->a, line->b, d) && float_step(line->a, p, e) && d[0] * e[1] == d[1] * e[0] &&
+           d[1] * e[2] == d[2] * e[1] && d[2] * e[0] == d[0] * e[2] && !same_point(line->a, line->b);
+}
+
+static bool same_line(const umb_seen_line *a, const umb_seen_line *b)
+{
+    return a == b || (!a->free && !b->free && holds(a, b->a) && holds(a, b->b) && !same_point(b->a, b->b));
+}
+
+static bool all_hold(const umb_seen_line *const lines[3], const float p[3])
+{
+    return holds(lines[0], p) && holds(lines[1], p) && holds(lines[2], p);
+}
+
+/* A point of both planes. */
+static bool meets(const umb_seen_depth *d, const float p[3])
+{
+    return umb_orient(d->back[0], d->back[1], d->back[2], p) == 0 && umb_orient(d->front[0], d->front[1], d->front[2], p) == 0;
+}
+
+static bool meets_all_of(const umb_seen_depth *d, const umb_seen_line *line)
+{
+    return !line->free && meets(d, line->a) && meets(d, line->b);
+}
+
+/* Lines and corners that meet in space. */
 static bool surely_on(const umb_seen_line *line, const umb_seen_corner *c)
 {
+    if (line->depth != NULL && c->first == NULL) {
+        return meets(line->depth, c->point);
+    }
+    if (line->depth != NULL && (meets_all_of(line->depth, c->first) || meets_all_of(line->depth, c->second))) {
+        return true;
+    }
     if (c->first == NULL) {
-        return !line->free && ends_at(line, c->point);
+        return !line->free && holds(line, c->point);
     }
     if (same_line(line, c->first) || same_line(line, c->second)) {
         return true;
@@ -361,8 +409,13 @@ static bool surely_on(const umb_seen_line *line, const umb_seen_corner *c)
     if (line->free || c->first->free || c->second->free) {
         return false;
     }
-    return (ends_at(c->first, line->a) && ends_at(c->second, line->a)) ||
-           (ends_at(c->first, line->b) && ends_at(c->second, line->b));
+    const umb_seen_line *const lines[3] = {line, c->first, c->second};
+    for (int i = 0; i < 3; ++i) {
+        if (all_hold(lines, lines[i]->a) || all_hold(lines, lines[i]->b)) {
+            return true;
+        }
+    }
+    return false;
 }
 
 /* By a bound that knows each component, then by what is exact. */
