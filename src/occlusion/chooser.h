@@ -23,6 +23,13 @@ typedef struct umb_chooser {
 void umb_chooser_create(umb_chooser *c, const umb_allocator *a);
 void umb_chooser_free(umb_chooser *c);
 
+/* How many a frame is to have: what was asked for, or the method's usual number, at most so many. */
+static inline uint32_t umb_chooser_budget(const umb_choice *choice, uint32_t usual, uint32_t most)
+{
+    uint32_t budget = choice->budget != 0 ? choice->budget : usual;
+    return budget < most ? budget : most;
+}
+
 /* Begin to choose so many for a frame. */
 umb_result umb_chooser_begin(umb_chooser *c, const umb_choice *choice, const umb_box_kernels *kernels, uint32_t wanted);
 /* The next one; false when there is none. */

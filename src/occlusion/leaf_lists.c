@@ -29,19 +29,24 @@ static size_t entry_count(const umb_leaf_lists *l)
     return (size_t)2 * UMB_LEAF_DIRECTIONS * l->length;
 }
 
-static void free_tree(umb_leaf_lists *l)
+static void free_arrays(umb_leaf_lists *l, uint32_t count)
 {
     const umb_allocator *a = &l->allocator;
-    uint32_t count = l->leaves != NULL ? 1u << l->depth : 0;
-    for (uint32_t i = 0; i < count; ++i) {
-        umb_memory_free(a, l->leaves[i].entries, entry_count(l) * sizeof *l->leaves[i].entries);
-    }
     umb_memory_free(a, l->leaves, count * sizeof *l->leaves);
     umb_memory_free(a, l->at, count * sizeof *l->at);
     umb_memory_free(a, l->axes, count);
     l->leaves = NULL;
     l->at = NULL;
     l->axes = NULL;
+}
+
+static void free_tree(umb_leaf_lists *l)
+{
+    uint32_t count = l->leaves != NULL ? 1u << l->depth : 0;
+    for (uint32_t i = 0; i < count; ++i) {
+        umb_memory_free(&l->allocator, l->leaves[i].entries, entry_count(l) * sizeof *l->leaves[i].entries);
+    }
+    free_arrays(l, count);
     l->made = false;
     l->wanted = UMB_NONE;
 }
@@ -164,12 +169,7 @@ static bool make_tree(umb_leaf_lists *l, const umb_selector *s, const umb_choice
     l->at = umb_memory_allocate_zero(a, count, sizeof *l->at);
     l->axes = umb_memory_allocate_zero(a, count, 1);
     if (l->leaves == NULL || l->at == NULL || l->axes == NULL) {
-        umb_memory_free(a, l->leaves, count * sizeof *l->leaves);
-        umb_memory_free(a, l->at, count * sizeof *l->at);
-        umb_memory_free(a, l->axes, count);
-        l->leaves = NULL;
-        l->at = NULL;
-        l->axes = NULL;
+        free_arrays(l, count);
         return false;
     }
     l->bounds = choice->tree->bounds;

@@ -73,22 +73,16 @@ static bool insert(method *m, const umb_pick *pick)
     return m->tree.planted != before;
 }
 
-static uint32_t budget_of(const umb_choice *choice)
-{
-    uint32_t budget = choice->budget != 0 ? choice->budget : OCCLUDERS;
-    return budget < MOST ? budget : MOST;
-}
-
 static umb_result make_ahead(void *state, const umb_choice *choice)
 {
     method *m = state;
-    return umb_chooser_prepare(&m->chooser, choice, m->kernels, TRIES * budget_of(choice));
+    return umb_chooser_prepare(&m->chooser, choice, m->kernels, TRIES * umb_chooser_budget(choice, OCCLUDERS, MOST));
 }
 
 static umb_result choose(void *state, const umb_choice *choice)
 {
     method *m = state;
-    uint32_t budget = budget_of(choice), taken = 0;
+    uint32_t budget = umb_chooser_budget(choice, OCCLUDERS, MOST), taken = 0;
     m->choice = choice;
     umb_pick pick;
     if (!reserve(m, budget) || umb_chooser_begin(&m->chooser, choice, m->kernels, TRIES * budget) != UMB_OK) {

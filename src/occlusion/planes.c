@@ -127,22 +127,16 @@ void umb_planes_count(const void *state, uint64_t *kept, uint64_t *made)
     *made = p->cache.made;
 }
 
-static uint32_t wanted_of(const umb_choice *choice)
-{
-    uint32_t wanted = choice->budget != 0 ? choice->budget : CHOSEN;
-    return wanted < MOST ? wanted : MOST;
-}
-
 static umb_result make_ahead(void *state, const umb_choice *choice)
 {
     planes *p = state;
-    return umb_chooser_prepare(&p->chooser, choice, p->box_kernels, wanted_of(choice));
+    return umb_chooser_prepare(&p->chooser, choice, p->box_kernels, umb_chooser_budget(choice, CHOSEN, MOST));
 }
 
 static umb_result choose(void *state, const umb_choice *choice)
 {
     planes *p = state;
-    uint32_t wanted = wanted_of(choice);
+    uint32_t wanted = umb_chooser_budget(choice, CHOSEN, MOST);
     if ((choice->coherence & UMB_COHERENCE_REST) != 0 && p->chooser.selector.rest_structure == choice->scene->structure) {
         tell_selector(p);
     }

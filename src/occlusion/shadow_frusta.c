@@ -121,22 +121,16 @@ static void prefer_past(frusta *f)
     }
 }
 
-static uint32_t budget_of(const umb_choice *choice)
-{
-    uint32_t budget = choice->budget != 0 ? choice->budget : CHOSEN;
-    return budget < MOST ? budget : MOST;
-}
-
 static umb_result make_ahead(void *state, const umb_choice *choice)
 {
     frusta *f = state;
-    return umb_chooser_prepare(&f->chooser, choice, f->box_kernels, CANDIDATES * budget_of(choice));
+    return umb_chooser_prepare(&f->chooser, choice, f->box_kernels, CANDIDATES * umb_chooser_budget(choice, CHOSEN, MOST));
 }
 
 static umb_result choose(void *state, const umb_choice *choice)
 {
     frusta *f = state;
-    uint32_t budget = budget_of(choice), most = CANDIDATES * budget;
+    uint32_t budget = umb_chooser_budget(choice, CHOSEN, MOST), most = CANDIDATES * budget;
     f->choice = choice;
     if (!reserve(f, budget, most, choice->scene->occluder_count)) {
         return UMB_ERROR_MEMORY;
