@@ -1,8 +1,8 @@
 /* What it costs to follow motion: for each size, spread and share of movers, and each way to update, milliseconds for
  * the commit (scene and index) and for the cull after it, beside an index that is built anew each frame; objects that
- * come and go; and what a frame costs in ever larger scenes of which the same number of objects is visible.
+ * come and go; how long single commits take; and what a frame costs in ever larger scenes of which the same number of objects is visible.
  *
- *     bench_updates [most objects] [seconds for each figure] [index] [motion|changes|scaling]
+ *     bench_updates [most objects] [seconds for each figure] [index] [motion|changes|commits|scaling]
  *
  * Lines of comma-separated values; scripts/updates-report makes docs/results/updates.md of them. Ratios are within one
  * run, times the processor's, of this thread.
@@ -280,6 +280,61 @@ static void bench_changes(uint32_t count, const umb_index_def *kind, double seco
     }
 }
 
+/* ---- single commits ----------------------------------------------------------------------------- */
+
+enum { COMMITS = 800, UNTIMED = 100 };
+
+static int compare(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* A world of its own for each way. Refitting alone shows what the moves cost; what the usual way takes above that are pieces of
+ * a tree made anew. */
+static void bench_commits(uint32_t count, uint32_t percent, umb_index_update way, double seconds)
+{
+    static double times[COMMITS];
+    umb_index_def def = {.update = way};
+    umb_index *index;
+    umb_index_stats stats, fresh;
+    swarm s = {0};
+    random_state = 88172645463325252u;
+    swarm_make(&s, count, false);
+    must(umb_index_create(s.scene, &def, &index));
+    uint32_t n = 0;
+    double begun = now();
+    for (uint32_t f = 0; f < UNTIMED + COMMITS && (n < 100 || now() - begun < seconds); ++f) {
+        swarm_step(&s, percent);
+        double start = now();
+        must(umb_scene_commit(s.scene));
+        times[n] = 1e3 * (now() - start);
+        n += f >= UNTIMED;
+    }
+    umb_index_get_stats(index, &stats);
+    umb_index_destroy(index);
+    must(umb_index_create(s.scene, NULL, &index));
+    umb_index_get_stats(index, &fresh);
+    qsort(times, n, sizeof times[0], compare);
+    printf("commits,%u,%u,%s,%.4f,%.4f,%.4f,%u,%.3f\n", count, percent, umb_index_update_name(way), times[n / 2],
+           times[(uint32_t)(0.99 * (n - 1))], times[n - 1], n, stats.cost / fresh.cost);
+    fflush(stdout);
+    umb_index_destroy(index);
+    swarm_free(&s);
+}
+
+static void bench_all_commits(uint32_t most, double seconds)
+{
+    static const uint32_t percents[] = {1, 10, 100};
+    printf("commits,objects,moving_percent,way,median_ms,p99_ms,worst_ms,commits,cost_over_new\n");
+    for (uint32_t count = 10000; count <= most; count *= 10) {
+        for (int p = 0; p < 3; ++p) {
+            bench_commits(count, percents[p], UMB_UPDATE_REFIT, seconds);
+            bench_commits(count, percents[p], UMB_UPDATE_INCREMENTAL, seconds);
+        }
+    }
+}
+
 /* ---- output sensitivity ------------------------------------------------------------------------- */
 
 /* A wall, two hundred things in front of it, and ever more behind it, in a hall that grows with them; one in ten of
@@ -425,11 +480,11 @@ int main(int argc, char **argv)
     const char *part = argc > 4 ? argv[4] : "";
     umb_index_def def = {0};
     bool all = part[0] == '\0', motion = all || strcmp(part, "motion") == 0, changes = all || strcmp(part, "changes") == 0;
-    bool scaling = all || strcmp(part, "scaling") == 0;
+    bool commits = all || strcmp(part, "commits") == 0, scaling = all || strcmp(part, "scaling") == 0;
     if (most < 1000 || !(seconds > 0.0) || (argc > 3 && !umb_index_parse(argv[3], &def)) ||
-        !(motion || changes || scaling)) {
+        !(motion || changes || commits || scaling)) {
         fprintf(stderr, "usage: bench_updates [most objects, from 1000] [seconds for each figure] [index] "
-                        "[motion|changes|scaling]\n");
+                        "[motion|changes|commits|scaling]\n");
         return 2;
     }
     if (motion) {
@@ -437,6 +492,9 @@ int main(int argc, char **argv)
     }
     if (changes) {
         bench_all_changes(most, &def, seconds);
+    }
+    if (commits) {
+        bench_all_commits(most, seconds);
     }
     if (scaling) {
         printf("scaling,behind,visible,still_cull_ms,moving_cull_ms,moving_commit_ms\n");

@@ -319,42 +319,49 @@ void umb_bvh_find_places(const umb_node *nodes, uint32_t node_count, uint32_t *p
 
 /* ---- lists of objects ------------------------------------------------------------------------ */
 
-/* How many objects are in each node or below. Children come after their parents. */
-static void count_below(const umb_node *nodes, uint32_t node_count, umb_range *below)
+void umb_bvh_count_below(const umb_node *nodes, uint32_t number, umb_range *below)
 {
-    for (uint32_t k = node_count; k-- > 0;) {
-        below[k].count = 0;
-        for (uint32_t slot = 0; slot < nodes[k].count; ++slot) {
-            uint32_t ref = nodes[k].ref[slot], kind = ref & UMB_REF_KIND;
-            below[k].count += kind == UMB_REF_NODE ? below[ref & UMB_REF_NUMBER].count : kind == UMB_REF_OBJECT;
+    uint32_t count = 0;
+    for (uint32_t slot = 0; slot < nodes[number].count; ++slot) {
+        uint32_t ref = nodes[number].ref[slot], kind = ref & UMB_REF_KIND;
+        count += kind == UMB_REF_NODE ? below[ref & UMB_REF_NUMBER].count : kind == UMB_REF_OBJECT;
+    }
+    below[number].count = count;
+}
+
+uint32_t umb_bvh_list_below(const umb_node *nodes, uint32_t number, uint32_t first, uint32_t *objects, umb_range *below)
+{
+    const umb_node *node = &nodes[number];
+    bool top = node->parent == UMB_NONE;
+    if (top) {
+        below[number].first = first;
+    }
+    uint32_t at = below[number].first;
+    for (uint32_t slot = 0; slot < node->count; ++slot) {
+        uint32_t ref = node->ref[slot], to = ref & UMB_REF_NUMBER;
+        switch (ref & UMB_REF_KIND) {
+        case UMB_REF_NODE:
+            below[to].first = at;
+            at += below[to].count;
+            break;
+        case UMB_REF_OBJECT:
+            objects[at++] = to;
+            break;
+        default:
+            break;
         }
     }
+    return top ? below[number].count : 0;
 }
 
 uint32_t umb_bvh_list_objects(const umb_node *nodes, uint32_t node_count, uint32_t *objects, umb_range *below)
 {
     uint32_t total = 0;
-    count_below(nodes, node_count, below);
+    for (uint32_t k = node_count; k-- > 0;) {
+        umb_bvh_count_below(nodes, k, below);
+    }
     for (uint32_t k = 0; k < node_count; ++k) {
-        if (nodes[k].parent == UMB_NONE) {
-            below[k].first = total;
-            total += below[k].count;
-        }
-        uint32_t at = below[k].first;
-        for (uint32_t slot = 0; slot < nodes[k].count; ++slot) {
-            uint32_t number = nodes[k].ref[slot] & UMB_REF_NUMBER;
-            switch (nodes[k].ref[slot] & UMB_REF_KIND) {
-            case UMB_REF_NODE:
-                below[number].first = at;
-                at += below[number].count;
-                break;
-            case UMB_REF_OBJECT:
-                objects[at++] = number;
-                break;
-            default:
-                break;
-            }
-        }
+        total += umb_bvh_list_below(nodes, k, total, objects, below);
     }
     memset(objects + total, 0, UMB_TREE_SPARE * sizeof objects[0]);
     return total;

@@ -42,6 +42,10 @@ void umb_bvh_find_places(const umb_node *nodes, uint32_t node_count, uint32_t *p
  * all of them and UMB_TREE_SPARE more, below node_count entries. Nodes without a parent come one after the other.
  * Returns the number of objects. */
 uint32_t umb_bvh_list_objects(const umb_node *nodes, uint32_t node_count, uint32_t *objects, umb_range *below);
+/* The same node by node. Count all, children before their parents; then list all, parents before their children: first is
+ * where a node without a parent begins. Returns how many objects are below such a node; 0 for others. */
+void umb_bvh_count_below(const umb_node *nodes, uint32_t number, umb_range *below);
+uint32_t umb_bvh_list_below(const umb_node *nodes, uint32_t number, uint32_t first, uint32_t *objects, umb_range *below);
 
 /* A set of node numbers that gives back its highest first: children before their parents. Empty
  * between refits. */
@@ -118,11 +122,10 @@ void umb_bvh_steps_destroy(umb_bvh_steps *steps, const umb_allocator *a);
 size_t umb_bvh_steps_memory(const umb_bvh_steps *steps);
 /* Room for what is likely to be wanted for so many items. False without memory. */
 bool umb_bvh_steps_reserve(umb_bvh_steps *steps, const umb_allocator *a, uint32_t count);
-/* Items and splits stay the caller's and where they are. False without memory. */
-bool umb_bvh_steps_start(umb_bvh_steps *steps, const umb_allocator *a, umb_bvh_item *items, uint32_t count,
-                         umb_bvh_split *splits);
-/* One step, of a few thousand items, or all of them once. Returns what it cost: about the number of items looked at.
- * 0: nothing is left to do; UMB_NONE: there is no memory. */
+/* Items, at least one, and splits stay the caller's and where they are. */
+void umb_bvh_steps_start(umb_bvh_steps *steps, umb_bvh_item *items, uint32_t count, umb_bvh_split *splits);
+/* One step, of at most some thousand items unless their centres are all in one place. Returns what it cost, in about
+ * nanoseconds. 0: nothing is left to do; UMB_NONE: there is no memory. */
 uint32_t umb_bvh_steps_run(umb_bvh_steps *steps, const umb_allocator *a);
 /* When nothing is left to do: the root. */
 uint32_t umb_bvh_steps_finish(umb_bvh_steps *steps);

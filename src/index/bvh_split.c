@@ -35,6 +35,7 @@ typedef struct build {
     struct task *tasks;
     size_t task_capacity;
     uint32_t task_count;
+    uint32_t task_items; /* ranges of so many, or fewer, are tasks */
     const umb_allocator *allocator;
 } build;
 
@@ -60,17 +61,17 @@ static inline float centroid(const umb_bvh_item *item, int axis)
     return 0.25f * item->min[axis] + 0.25f * item->max[axis];
 }
 
-static box4 centroid_box(const umb_bvh_item *items, const range *r)
+static void grow_centres(box4 *centres, const umb_bvh_item *items, uint32_t first, uint32_t end)
 {
-    box4 b = empty_box;
-    for (uint32_t k = r->first; k < r->end; ++k) {
+    box4 b = *centres;
+    for (uint32_t k = first; k < end; ++k) {
         float c[4];
         for (int i = 0; i < 4; ++i) {
             c[i] = 0.25f * items[k].min[i] + 0.25f * items[k].max[i];
         }
         box_grow(&b, c, c);
     }
-    return b;
+    *centres = b;
 }
 
 /* ---- choosing a split ----------------------------------------------------------------------- */
@@ -109,13 +110,12 @@ static inline int bin_of(const bins *b, const umb_bvh_item *item, int axis)
     return k < BINS ? k : BINS - 1;
 }
 
-static void fill_bins(bins *b, const umb_bvh_item *items, const range *r)
+static void start_bins(bins *b, const box4 *centres)
 {
-    box4 centres = centroid_box(items, r);
     for (int axis = 0; axis < 3; ++axis) {
-        float extent = centres.max[axis] - centres.min[axis];
+        float extent = centres->max[axis] - centres->min[axis];
         float scale = extent > 0.0f ? (float)BINS / extent : 0.0f;
-        b->low[axis] = centres.min[axis];
+        b->low[axis] = centres->min[axis];
         /* The reciprocal of a denormal extent may overflow: such an axis counts as flat. */
         b->scale[axis] = isfinite(scale) ? scale : 0.0f;
         for (int i = 0; i < BINS; ++i) {
@@ -123,7 +123,11 @@ static void fill_bins(bins *b, const umb_bvh_item *items, const range *r)
             b->count[axis][i] = 0;
         }
     }
-    for (uint32_t k = r->first; k < r->end; ++k) {
+}
+
+static void fill_bins(bins *b, const umb_bvh_item *items, uint32_t first, uint32_t end)
+{
+    for (uint32_t k = first; k < end; ++k) {
         const umb_bvh_item *item = &items[k];
         for (int axis = 0; axis < 3; ++axis) {
             int i = bin_of(b, item, axis);
@@ -158,11 +162,23 @@ static void choose_bin(const bins *b, int axis, choice *best)
     }
 }
 
-static uint32_t partition(const bins *b, umb_bvh_item *items, const range *r, const choice *c)
+/* The best split between bins; false: there is none. */
+static bool choose_bins(const bins *b, choice *best)
 {
-    uint32_t i = r->first;
-    uint32_t j = r->end;
-    for (;;) {
+    for (int axis = 0; axis < 3; ++axis) {
+        if (b->scale[axis] > 0.0f) {
+            choose_bin(b, axis, best);
+        }
+    }
+    return best->balance > 0;
+}
+
+/* Go on with bringing what belongs left to the left: items before *left are, items from *end on are not. At most so many
+ * exchanges. True when it is done: both are the middle. */
+static bool partition(const bins *b, umb_bvh_item *items, uint32_t *left, uint32_t *end, const choice *c, uint32_t most)
+{
+    uint32_t i = *left, j = *end;
+    for (; most > 0; --most) {
         while (i < j && bin_of(b, &items[i], c->axis) < c->bin) {
             ++i;
         }
@@ -170,12 +186,15 @@ static uint32_t partition(const bins *b, umb_bvh_item *items, const range *r, co
             --j;
         }
         if (i >= j) {
-            return i;
+            break;
         }
         umb_bvh_item t = items[i];
         items[i] = items[j - 1];
         items[j - 1] = t;
     }
+    *left = i;
+    *end = j;
+    return i >= j;
 }
 
 /* Sort a few items by centroid; stable, so that the result is one function of the input's order. */
@@ -243,14 +262,14 @@ static uint32_t split_range(umb_bvh_item *items, const range *r, choice *best)
     }
     if (r->depth < HALVE_DEPTH) {
         bins b;
-        fill_bins(&b, items, r);
-        for (int axis = 0; axis < 3; ++axis) {
-            if (b.scale[axis] > 0.0f) {
-                choose_bin(&b, axis, best);
-            }
-        }
-        if (best->balance > 0) {
-            return partition(&b, items, r, best);
+        box4 centres = empty_box;
+        grow_centres(&centres, items, r->first, r->end);
+        start_bins(&b, &centres);
+        fill_bins(&b, items, r->first, r->end);
+        if (choose_bins(&b, best)) {
+            uint32_t middle = r->first, end = r->end;
+            (void)partition(&b, items, &middle, &end, best, UINT32_MAX);
+            return middle;
         }
     }
     return split_in_half(items, r, best);
@@ -258,17 +277,22 @@ static uint32_t split_range(umb_bvh_item *items, const range *r, choice *best)
 
 /* ---- recursion ------------------------------------------------------------------------------ */
 
-static umb_bvh_split *split_node(build *b, const range *r, range halves[2])
+static umb_bvh_split *enter_split(build *b, const range *r, uint32_t middle, const choice *best, range halves[2])
 {
-    choice best;
-    uint32_t middle = split_range(b->items, r, &best);
     umb_bvh_split *s = &b->splits[middle];
-    range left = {r->first, middle, r->depth + 1, &s->left, best.left};
-    range right = {middle, r->end, r->depth + 1, &s->right, best.right};
+    range left = {r->first, middle, r->depth + 1, &s->left, best->left};
+    range right = {middle, r->end, r->depth + 1, &s->right, best->right};
     halves[0] = left;
     halves[1] = right;
     *r->link = middle;
     return s;
+}
+
+static umb_bvh_split *split_node(build *b, const range *r, range halves[2])
+{
+    choice best;
+    uint32_t middle = split_range(b->items, r, &best);
+    return enter_split(b, r, middle, &best, halves);
 }
 
 static umb_cut split_all(build *b, const range *r)
@@ -299,7 +323,7 @@ static void run_task(void *data, uint32_t i)
 /* Split large ranges here and gather the others as tasks, from left to right. */
 static bool split_top(build *b, const range *r)
 {
-    if (r->end - r->first <= TASK_ITEMS) {
+    if (r->end - r->first <= b->task_items) {
         if (!umb_memory_reserve(b->allocator, (void **)&b->tasks, &b->task_capacity,
                                 (size_t)b->task_count + 1, sizeof(b->tasks[0]))) {
             return false;
@@ -315,7 +339,7 @@ static bool split_top(build *b, const range *r)
 /* The cuts of the splits that split_top made, by the same walk; *next counts the tasks met. */
 static umb_cut cut_top(build *b, uint32_t node, uint32_t first, uint32_t end, uint32_t *next, box4 *box)
 {
-    if (end - first <= TASK_ITEMS) {
+    if (end - first <= b->task_items) {
         const task *t = &b->tasks[(*next)++];
         *box = t->range.box;
         return t->cut;
@@ -331,7 +355,7 @@ static umb_cut cut_top(build *b, uint32_t node, uint32_t first, uint32_t end, ui
 umb_result umb_bvh_split_items(const umb_allocator *a, const umb_tasks *tasks, umb_bvh_item *items,
                                uint32_t count, umb_bvh_split *splits, uint32_t *root)
 {
-    build b = {.items = items, .splits = splits, .allocator = a};
+    build b = {.items = items, .splits = splits, .task_items = TASK_ITEMS, .allocator = a};
     range all = {0, count, 0, root, empty_box};
     for (uint32_t i = 0; i < count; ++i) {
         box_grow(&all.box, items[i].min, items[i].max);
@@ -373,35 +397,48 @@ uint32_t umb_bvh_split_run(umb_bvh_item *items, uint32_t first, uint32_t end, um
 
 /* ---- in steps ------------------------------------------------------------------------------- */
 
-static build begin(umb_bvh_item *items, uint32_t count, umb_bvh_split *splits, range *all)
-{
-    build b = {.items = items, .splits = splits};
-    all->box = empty_box;
-    for (uint32_t i = 0; i < count; ++i) {
-        box_grow(&all->box, items[i].min, items[i].max);
-    }
-    b.costs = umb_cut_costs_of(umb_half_area(all->box.min, all->box.max), count);
-    return b;
-}
-
 uint32_t umb_bvh_split_at_once(umb_bvh_item *items, uint32_t count, umb_bvh_split *splits)
 {
+    build b = {.items = items, .splits = splits};
     uint32_t root;
     range all = {0, count, 0, &root, empty_box};
-    build b = begin(items, count, splits, &all);
+    for (uint32_t i = 0; i < count; ++i) {
+        box_grow(&all.box, items[i].min, items[i].max);
+    }
+    b.costs = umb_cut_costs_of(umb_half_area(all.box.min, all.box.max), count);
     split_all(&b, &all);
     return root;
 }
 
-/* What one of TASK_ITEMS costs when all its levels are split, over once being looked at: most levels are in the
- * caches. */
-#define TASK_COST 6
+/* A range of more items than SMALL is split in several steps of at most STEP_ITEMS, a smaller one in one. */
+#define STEP_ITEMS 4096u
+#define SMALL 256u
+/* What an item costs in each kind of step, in about nanoseconds; of a small range, in all its levels. */
+#define BOX_COST 4
+#define CENTRE_COST 3
+#define BIN_COST 16
+#define PARTITION_COST 16
+#define SMALL_COST 330
+
+typedef enum step_kind {
+    STEP_BOX, /* of all items */
+    STEP_NEXT,
+    STEP_CENTRES,
+    STEP_BINS,
+    STEP_PARTITION
+} step_kind;
 
 struct umb_bvh_steps {
     build build;
     range *waiting; /* the leftmost last */
     size_t capacity;
     uint32_t waiting_count, count, root;
+    step_kind kind;  /* of the next step, in: */
+    range range;
+    uint32_t at, end; /* items of it that have been looked at come before; of a partition: the rest comes from end on */
+    box4 centres;
+    bins bins;
+    choice best;
 };
 
 umb_bvh_steps *umb_bvh_steps_create(const umb_allocator *a)
@@ -427,53 +464,148 @@ size_t umb_bvh_steps_memory(const umb_bvh_steps *steps)
 bool umb_bvh_steps_reserve(umb_bvh_steps *steps, const umb_allocator *a, uint32_t count)
 {
     build *b = &steps->build;
-    size_t tasks = count / (TASK_ITEMS / 8) + 8;
+    size_t tasks = count / (SMALL / 8) + 8;
     return umb_memory_reserve(a, (void **)&steps->waiting, &steps->capacity, tasks, sizeof(steps->waiting[0])) &&
            umb_memory_reserve(a, (void **)&b->tasks, &b->task_capacity, tasks, sizeof(b->tasks[0]));
 }
 
-bool umb_bvh_steps_start(umb_bvh_steps *steps, const umb_allocator *a, umb_bvh_item *items, uint32_t count,
-                         umb_bvh_split *splits)
+void umb_bvh_steps_start(umb_bvh_steps *steps, umb_bvh_item *items, uint32_t count, umb_bvh_split *splits)
 {
-    if (!umb_memory_reserve(a, (void **)&steps->waiting, &steps->capacity, 1, sizeof(steps->waiting[0]))) {
-        return false;
-    }
-    struct task *tasks = steps->build.tasks;
-    size_t capacity = steps->build.task_capacity;
-    range all = {0, count, 0, &steps->root, empty_box};
-    steps->build = begin(items, count, splits, &all);
-    steps->build.tasks = tasks;
-    steps->build.task_capacity = capacity;
+    build *b = &steps->build;
+    *b = (build){.items = items, .splits = splits, .task_items = SMALL, .tasks = b->tasks, .task_capacity = b->task_capacity};
     steps->count = count;
-    steps->waiting[0] = all;
-    steps->waiting_count = 1;
-    return true;
+    steps->waiting_count = 0;
+    steps->range = (range){0, count, 0, &steps->root, empty_box};
+    steps->kind = STEP_BOX;
+    steps->at = 0;
+}
+
+/* The next items of the range; the cursor goes behind them. */
+static uint32_t take_items(umb_bvh_steps *steps)
+{
+    uint32_t from = steps->at, left = steps->range.end - from;
+    steps->at += left < STEP_ITEMS ? left : STEP_ITEMS;
+    return from;
+}
+
+/* What is left to do with all items looked at in one way, begins with the first one again in the next. */
+static void go_on(umb_bvh_steps *steps, step_kind kind)
+{
+    steps->kind = kind;
+    steps->at = steps->range.first;
+}
+
+static uint32_t step_box(umb_bvh_steps *steps)
+{
+    range *r = &steps->range;
+    uint32_t from = take_items(steps);
+    for (uint32_t k = from; k < steps->at; ++k) {
+        box_grow(&r->box, steps->build.items[k].min, steps->build.items[k].max);
+    }
+    uint32_t cost = BOX_COST * (steps->at - from);
+    if (steps->at == r->end) {
+        steps->build.costs = umb_cut_costs_of(umb_half_area(r->box.min, r->box.max), steps->count);
+        steps->waiting[steps->waiting_count++] = *r;
+        steps->kind = STEP_NEXT;
+    }
+    return cost;
+}
+
+/* The range has been split: its halves wait. */
+static void leave_range(umb_bvh_steps *steps, range halves[2])
+{
+    steps->waiting[steps->waiting_count++] = halves[1];
+    steps->waiting[steps->waiting_count++] = halves[0];
+    steps->kind = STEP_NEXT;
+}
+
+/* Without bins: what is left is halved. */
+static uint32_t step_half(umb_bvh_steps *steps)
+{
+    range halves[2], *r = &steps->range;
+    uint32_t middle = split_in_half(steps->build.items, r, &steps->best);
+    enter_split(&steps->build, r, middle, &steps->best, halves);
+    leave_range(steps, halves);
+    return BOX_COST * (r->end - r->first);
+}
+
+static uint32_t step_next(umb_bvh_steps *steps)
+{
+    build *b = &steps->build;
+    range *r = &steps->range;
+    *r = steps->waiting[--steps->waiting_count];
+    uint32_t count = r->end - r->first;
+    if (count <= SMALL) {
+        b->tasks[b->task_count].range = *r;
+        run_task(b, b->task_count++);
+        return SMALL_COST * count;
+    }
+    if (r->depth >= HALVE_DEPTH) {
+        return step_half(steps);
+    }
+    steps->centres = empty_box;
+    go_on(steps, STEP_CENTRES);
+    return 1;
+}
+
+static uint32_t step_centres(umb_bvh_steps *steps)
+{
+    uint32_t from = take_items(steps), cost = CENTRE_COST * (steps->at - from);
+    grow_centres(&steps->centres, steps->build.items, from, steps->at);
+    if (steps->at == steps->range.end) {
+        start_bins(&steps->bins, &steps->centres);
+        go_on(steps, STEP_BINS);
+    }
+    return cost;
+}
+
+static uint32_t step_bins(umb_bvh_steps *steps)
+{
+    uint32_t from = take_items(steps), cost = BIN_COST * (steps->at - from);
+    fill_bins(&steps->bins, steps->build.items, from, steps->at);
+    if (steps->at == steps->range.end) {
+        steps->best = (choice){.cost = INFINITY};
+        if (!choose_bins(&steps->bins, &steps->best)) {
+            return cost + step_half(steps);
+        }
+        go_on(steps, STEP_PARTITION);
+        steps->end = steps->range.end;
+    }
+    return cost;
+}
+
+static uint32_t step_partition(umb_bvh_steps *steps)
+{
+    uint32_t left = steps->end - steps->at;
+    if (partition(&steps->bins, steps->build.items, &steps->at, &steps->end, &steps->best, STEP_ITEMS / 8)) {
+        range halves[2];
+        enter_split(&steps->build, &steps->range, steps->at, &steps->best, halves);
+        leave_range(steps, halves);
+    }
+    return PARTITION_COST * (left - (steps->end - steps->at)) + 1;
 }
 
 uint32_t umb_bvh_steps_run(umb_bvh_steps *steps, const umb_allocator *a)
 {
     build *b = &steps->build;
-    if (steps->waiting_count == 0) {
-        return 0;
-    }
-    if (!umb_memory_reserve(a, (void **)&steps->waiting, &steps->capacity, (size_t)steps->waiting_count + 1,
+    if (!umb_memory_reserve(a, (void **)&steps->waiting, &steps->capacity, (size_t)steps->waiting_count + 2,
                             sizeof(steps->waiting[0])) ||
         !umb_memory_reserve(a, (void **)&b->tasks, &b->task_capacity, (size_t)b->task_count + 1,
                             sizeof(b->tasks[0]))) {
         return UMB_NONE;
     }
-    range r = steps->waiting[--steps->waiting_count];
-    uint32_t count = r.end - r.first;
-    if (count <= TASK_ITEMS) {
-        b->tasks[b->task_count].range = r;
-        run_task(b, b->task_count++);
-        return TASK_COST * count;
+    switch (steps->kind) {
+    case STEP_BOX:
+        return step_box(steps);
+    case STEP_CENTRES:
+        return step_centres(steps);
+    case STEP_BINS:
+        return step_bins(steps);
+    case STEP_PARTITION:
+        return step_partition(steps);
+    default:
+        return steps->waiting_count > 0 ? step_next(steps) : 0;
     }
-    range halves[2];
-    split_node(b, &r, halves);
-    steps->waiting[steps->waiting_count++] = halves[1];
-    steps->waiting[steps->waiting_count++] = halves[0];
-    return count;
 }
 
 uint32_t umb_bvh_steps_finish(umb_bvh_steps *steps)

@@ -236,6 +236,19 @@ static void list_objects(umb_index *index)
     e->stale = 0;
 }
 
+/* A tree made beside the one in use brings its list. */
+static void take_list(umb_index *index)
+{
+    umb_ready_tree *t = &index->job.ready;
+    uint32_t *objects = index->objects;
+    size_t capacity = index->object_capacity;
+    index->objects = t->objects;
+    index->object_capacity = t->object_capacity;
+    index->tree.object_count = t->object_count;
+    t->objects = objects;
+    t->object_capacity = capacity;
+}
+
 /* Room beside the nodes for a tree with so many slots and blocks. */
 static bool furnish(umb_index *index, uint32_t node_count, uint32_t slot_count, uint32_t block_count)
 {
@@ -382,8 +395,11 @@ static bool follow(umb_index *index, const umb_committed *c)
     if (e->failed || is_worn_out(index, c, grew)) {
         return false;
     }
+    if (exchanged) {
+        take_list(index);
+    }
     /* Lists made anew for every so many edits cost each of them the same. */
-    if ((exchanged || e->stale > e->slot_count / 4 + 64) && furnish(index, e->node_count, e->slot_count, 0)) {
+    if (e->stale > e->slot_count / 4 + 64 && furnish(index, e->node_count, e->slot_count, 0)) {
         list_objects(index);
     } else if (e->stale > 0) {
         index->tree.object_count = e->slot_count;

@@ -10,19 +10,23 @@
 #define LEAST_SAMPLE 64
 #define CHANGES_A_SAMPLE 8
 #define SAMPLE_AHEAD 4 /* how many looks ahead a node is asked for */
-/* The work is done in about so many commits, but for small trees. */
+/* What is done costs, in about nanoseconds, measured at 100,000 boxes: an item copied, a node laid out, and all of it, for each
+ * item. */
+#define GATHER_COST 6
+#define LAY_OUT_COST 110
+#define TOTAL_COST 700
+/* So much is done in a commit: a part of all of it for a small tree, a part of a millisecond for a large one, and more where
+ * commits bring more changes, which take long anyway and make the tree worse the faster. */
 #define COMMITS 24
-#define LEAST_WORK 8192
-/* What an item costs in each stage, in items gathered: measured at 100,000 boxes. */
-#define GATHER_COST 1
-#define LAY_OUT_COST 2
-#define TOTAL_COST 24
+#define LEAST_WORK 200000
+#define MOST_WORK 500000
+#define WORK_A_CHANGE 12
 
 void umb_rebuild_job_free(umb_rebuild_job *job, const umb_allocator *a)
 {
     umb_memory_free(a, job->items, job->item_capacity * sizeof *job->items);
     umb_memory_free(a, job->splits, job->split_capacity * sizeof *job->splits);
-    umb_memory_free(a, job->nodes, job->node_capacity * sizeof *job->nodes);
+    umb_ready_tree_free(&job->ready, a);
     umb_memory_free(a, job->stack, job->stack_capacity * sizeof *job->stack);
     umb_memory_free(a, job->log, job->log_capacity * sizeof *job->log);
     umb_bvh_steps_destroy(job->steps, a);
@@ -32,8 +36,8 @@ void umb_rebuild_job_free(umb_rebuild_job *job, const umb_allocator *a)
 size_t umb_rebuild_job_memory(const umb_rebuild_job *job)
 {
     return job->item_capacity * sizeof *job->items + job->split_capacity * sizeof *job->splits +
-           job->node_capacity * sizeof *job->nodes + job->stack_capacity * sizeof *job->stack +
-           job->log_capacity * sizeof *job->log;
+           umb_ready_tree_memory(&job->ready) + job->stack_capacity * sizeof *job->stack +
+           job->log_capacity * sizeof *job->log + (job->steps != NULL ? umb_bvh_steps_memory(job->steps) : 0);
 }
 
 void umb_rebuild_job_drop(umb_rebuild_job *job)
@@ -79,12 +83,12 @@ double umb_rebuild_job_watch(umb_rebuild_job *job, const umb_tree_edit *e, const
 /* ---- stages --------------------------------------------------------------------------------- */
 
 /* All that is likely to be wanted, as soon as anything moves: frames of steady motion are to allocate nothing. */
-static bool reserve(umb_rebuild_job *job, umb_tree_edit *e)
+static bool reserve(umb_rebuild_job *job, umb_tree_edit *e, const umb_committed *scene)
 {
     const umb_allocator *a = e->allocator;
     size_t count = e->slot_count, nodes = e->node_count - e->free.count;
     /* Trees of the same items differ a little in nodes: room is made for more than is asked for. */
-    bool little = job->node_capacity < nodes + nodes / 16 + 32 || e->room < nodes + nodes / 16 + 32;
+    bool little = job->ready.stock.node_capacity < nodes + nodes / 16 + 32 || e->room < nodes + nodes / 16 + 32;
     nodes += little ? nodes / 8 + 64 : 0;
     job->steps = job->steps != NULL ? job->steps : umb_bvh_steps_create(a);
     return job->steps != NULL && umb_bvh_steps_reserve(job->steps, a, e->slot_count) &&
@@ -92,13 +96,13 @@ static bool reserve(umb_rebuild_job *job, umb_tree_edit *e)
            umb_memory_reserve(a, (void **)&job->items, &job->item_capacity, count, sizeof *job->items) &&
            umb_memory_reserve(a, (void **)&job->splits, &job->split_capacity, count, sizeof *job->splits) &&
            umb_memory_reserve(a, (void **)&job->log, &job->log_capacity, count / 4 + 64, sizeof *job->log) &&
-           umb_memory_reserve(a, (void **)&job->nodes, &job->node_capacity, nodes, sizeof *job->nodes) &&
+           umb_ready_tree_reserve(&job->ready, a, nodes, count, scene) &&
            umb_memory_reserve(a, (void **)&job->stack, &job->stack_capacity, 1024, sizeof *job->stack);
 }
 
 static void begin(umb_rebuild_job *job)
 {
-    job->cursor = job->count = job->log_count = 0;
+    job->cursor = job->occluder_cursor = job->count = job->log_count = job->ready.occluder_limit = 0;
     job->stage = UMB_JOB_GATHER;
 }
 
@@ -120,8 +124,8 @@ static bool add_item(umb_rebuild_job *job, const umb_aabb *box, uint32_t ref)
 /* What is known of a reference: true if the copy has been made of it already. */
 static bool is_copied(const umb_rebuild_job *job, uint32_t ref)
 {
-    return job->stage != UMB_JOB_GATHER ||
-           ((ref & UMB_REF_KIND) == UMB_REF_OBJECT && (ref & UMB_REF_NUMBER) < job->cursor);
+    uint32_t cursor = (ref & UMB_REF_KIND) == UMB_REF_OBJECT ? job->cursor : job->occluder_cursor;
+    return job->stage != UMB_JOB_GATHER || (ref & UMB_REF_NUMBER) < cursor;
 }
 
 static bool note(umb_rebuild_job *job, uint32_t ref)
@@ -151,7 +155,7 @@ static bool note_all(umb_rebuild_job *job, const umb_committed *scene)
     return noted;
 }
 
-static bool gather(umb_rebuild_job *job, const umb_tree_edit *e, const umb_committed *scene, int64_t *budget)
+static bool gather(umb_rebuild_job *job, const umb_committed *scene, int64_t *budget)
 {
     for (; job->cursor < scene->object_count && *budget > 0; ++job->cursor, *budget -= GATHER_COST) {
         const umb_object *o = &scene->objects[job->cursor];
@@ -162,15 +166,23 @@ static bool gather(umb_rebuild_job *job, const umb_tree_edit *e, const umb_commi
     if (job->cursor < scene->object_count) {
         return true;
     }
-    for (uint32_t i = scene->first_free_occluder; i < scene->occluder_count; ++i) {
-        if (!add_item(job, &scene->occluders[i].bounds, UMB_REF_OCCLUDER | i)) {
+    uint32_t *at = &job->occluder_cursor;
+    for (*at = *at > scene->first_free_occluder ? *at : scene->first_free_occluder; *at < scene->occluder_count && *budget > 0;
+         ++*at, *budget -= GATHER_COST) {
+        if (!add_item(job, &scene->occluders[*at].bounds, UMB_REF_OCCLUDER | *at)) {
             return false;
         }
     }
-    *budget -= scene->occluder_count - scene->first_free_occluder;
+    job->ready.occluder_limit = job->ready.occluder_limit > *at ? job->ready.occluder_limit : *at;
+    if (*at < scene->occluder_count) {
+        return true;
+    }
     job->stage = UMB_JOB_SPLIT;
-    return job->count > 0 && job->count <= job->split_capacity &&
-           umb_bvh_steps_start(job->steps, e->allocator, job->items, job->count, job->splits);
+    bool usable = job->count > 0 && job->count <= job->split_capacity;
+    if (usable) {
+        umb_bvh_steps_start(job->steps, job->items, job->count, job->splits);
+    }
+    return usable;
 }
 
 static bool split(umb_rebuild_job *job, const umb_tree_edit *e, int64_t *budget)
@@ -182,7 +194,8 @@ static bool split(umb_rebuild_job *job, const umb_tree_edit *e, int64_t *budget)
         }
         if (cost == 0) {
             job->root = umb_bvh_steps_finish(job->steps);
-            job->node_count = 1;
+            job->ready.stock.node_count = 1;
+            job->ready.stock.slot_count = 0;
             job->stack_count = 0;
             job->stage = UMB_JOB_LAY_OUT;
             job->stack[job->stack_count++] = (umb_job_node){job->root, 0, UMB_NONE, 0};
@@ -193,24 +206,25 @@ static bool split(umb_rebuild_job *job, const umb_tree_edit *e, int64_t *budget)
     return true;
 }
 
-/* Structure alone: boxes are put in when it is ready. */
-static bool lay_out(umb_rebuild_job *job, const umb_tree_edit *e, int64_t *budget)
+/* Structure alone: boxes are put in later. */
+static bool lay_out(umb_rebuild_job *job, const umb_tree_edit *e, const umb_committed *scene, int64_t *budget)
 {
     const umb_allocator *a = e->allocator;
-    for (; job->stack_count > 0 && *budget > 0; *budget -= LAY_OUT_COST * UMB_NODE_WIDTH) {
+    umb_tree_stock *made = &job->ready.stock;
+    for (; job->stack_count > 0 && *budget > 0; *budget -= LAY_OUT_COST) {
         umb_job_node n = job->stack[--job->stack_count];
         uint32_t slots[UMB_NODE_WIDTH], count = umb_bvh_open(job->splits, n.split, slots);
-        if (!umb_memory_reserve(a, (void **)&job->nodes, &job->node_capacity, (size_t)n.number + 1,
-                                sizeof *job->nodes) ||
+        if (!umb_memory_reserve(a, (void **)&made->nodes, &made->node_capacity, (size_t)n.number + 1, sizeof *made->nodes) ||
             !umb_memory_reserve(a, (void **)&job->stack, &job->stack_capacity,
                                 (size_t)job->stack_count + UMB_NODE_WIDTH, sizeof *job->stack)) {
             return false;
         }
-        umb_node *node = &job->nodes[n.number];
+        umb_node *node = &made->nodes[n.number];
         *node = (umb_node){.count = count, .parent = n.parent, .slot = n.slot};
         for (uint32_t i = 0; i < count; ++i) {
-            node->ref[i] = (slots[i] & UMB_BVH_ITEM) != 0 ? job->items[slots[i] & ~UMB_BVH_ITEM].ref
-                                                          : job->node_count++;
+            bool item = (slots[i] & UMB_BVH_ITEM) != 0;
+            node->ref[i] = item ? job->items[slots[i] & ~UMB_BVH_ITEM].ref : made->node_count++;
+            made->slot_count += item;
         }
         for (uint32_t i = count; i-- > 0;) {
             if ((slots[i] & UMB_BVH_ITEM) == 0) {
@@ -218,8 +232,11 @@ static bool lay_out(umb_rebuild_job *job, const umb_tree_edit *e, int64_t *budge
             }
         }
     }
-    job->stage = job->stack_count == 0 ? UMB_JOB_READY : job->stage;
-    return true;
+    if (job->stack_count > 0) {
+        return true;
+    }
+    job->stage = UMB_JOB_FIT;
+    return umb_ready_tree_begin(&job->ready, a, scene);
 }
 
 /* ---- the exchange --------------------------------------------------------------------------- */
@@ -230,7 +247,9 @@ static void put_right(umb_tree_edit *e, const umb_committed *scene, uint32_t ref
     uint32_t number = ref & UMB_REF_NUMBER;
     bool object = (ref & UMB_REF_KIND) == UMB_REF_OBJECT, there;
     there = object ? scene->objects[number].live : number >= scene->first_free_occluder && number < scene->occluder_count;
-    umb_tree_edit_remove(e, ref, UMB_NONE);
+    if (number < (object ? e->place_capacity : e->occluder_capacity)) {
+        umb_tree_edit_remove(e, ref, UMB_NONE);
+    }
     if (there) {
         const umb_aabb *box = object ? &scene->objects[number].bounds : &scene->occluders[number].bounds;
         umb_tree_edit_insert(e, UMB_WAY_CHEAPEST, 0, UMB_NONE, box, ref);
@@ -239,46 +258,63 @@ static void put_right(umb_tree_edit *e, const umb_committed *scene, uint32_t ref
 
 static bool exchange(umb_rebuild_job *job, umb_tree_edit *e, const umb_committed *scene)
 {
-    umb_node *old = e->nodes;
-    size_t old_capacity = e->node_capacity;
-    umb_bvh_refit(job->nodes, job->node_count, scene);
-    if (!umb_tree_edit_adopt(e, job->nodes, job->node_count, job->node_capacity, false, scene)) {
-        return false;
-    }
-    job->nodes = old;
-    job->node_capacity = old_capacity;
+    bool done = umb_ready_tree_exchange(&job->ready, e, scene);
     for (uint32_t i = 0; i < job->log_count && !e->failed; ++i) {
         put_right(e, scene, job->log[i]);
     }
     umb_bvh_lift_marked(e->nodes, &e->marks, e->volumes);
-    return true;
+    return done;
+}
+
+/* ---- slices --------------------------------------------------------------------------------- */
+
+static int64_t budget_of(const umb_tree_edit *e, const umb_committed *scene, bool structure)
+{
+    int64_t changes = (int64_t)scene->moved_count + (structure ? scene->came_count + scene->went_count : 0);
+    int64_t part = (int64_t)e->slot_count * TOTAL_COST / COMMITS, most = MOST_WORK + WORK_A_CHANGE * changes;
+    part = part < most ? part : most;
+    return part > LEAST_WORK ? part : LEAST_WORK;
+}
+
+/* Go on with the work, through as many stages as there is time for. False if it has to be given up. */
+static bool work(umb_rebuild_job *job, const umb_tree_edit *e, const umb_committed *scene, int64_t budget)
+{
+    bool going = true;
+    if (job->stage >= UMB_JOB_FIT) {
+        umb_ready_tree_follow(&job->ready, scene);
+    }
+    if (job->stage == UMB_JOB_GATHER) {
+        going = gather(job, scene, &budget);
+    }
+    if (going && job->stage == UMB_JOB_SPLIT) {
+        going = split(job, e, &budget);
+    }
+    if (going && job->stage == UMB_JOB_LAY_OUT) {
+        going = lay_out(job, e, scene, &budget);
+    }
+    if (going && job->stage == UMB_JOB_FIT && umb_ready_tree_fit(&job->ready, scene, &budget)) {
+        job->stage = UMB_JOB_LIST;
+    }
+    if (going && job->stage == UMB_JOB_LIST && umb_ready_tree_list(&job->ready, &budget)) {
+        job->stage = UMB_JOB_READY;
+    }
+    return going;
 }
 
 bool umb_rebuild_job_step(umb_rebuild_job *job, umb_tree_edit *e, const umb_committed *scene, bool structure)
 {
-    bool going = true, exchanged = false;
+    bool exchanged = false;
     if (job->stage == UMB_JOB_IDLE) {
         double growth = umb_rebuild_job_watch(job, e, scene, structure);
-        if ((scene->moved_count == 0 && !structure) || e->slot_count <= UMB_NODE_WIDTH || !reserve(job, e) ||
+        if ((scene->moved_count == 0 && !structure) || e->slot_count <= UMB_NODE_WIDTH || !reserve(job, e, scene) ||
             growth <= BEGIN_GROWTH) {
             return false;
         }
         begin(job);
         structure = false; /* what is copied from now on knows of it */
     }
-    int64_t budget = (int64_t)e->slot_count * TOTAL_COST / COMMITS;
-    budget = budget > LEAST_WORK ? budget : LEAST_WORK;
-    going = !structure || note_all(job, scene);
-    if (going && job->stage == UMB_JOB_GATHER) {
-        going = gather(job, e, scene, &budget);
-    }
-    if (going && job->stage == UMB_JOB_SPLIT && budget > 0) {
-        going = split(job, e, &budget);
-    }
-    if (going && job->stage == UMB_JOB_LAY_OUT && budget > 0) {
-        going = lay_out(job, e, &budget);
-    }
-    if (going && job->stage == UMB_JOB_READY && budget > 0) {
+    bool going = (!structure || note_all(job, scene)) && work(job, e, scene, budget_of(e, scene, structure));
+    if (going && job->stage == UMB_JOB_READY) {
         exchanged = exchange(job, e, scene);
         going = false;
     }

@@ -1,17 +1,19 @@
 /* Building a tree anew beside the one in use, a bounded amount of work each commit (incremental rebuild): the items are
- * copied, split and laid out in steps; then the new tree takes the old one's place with the boxes of the day, and what
+ * copied and split, the nodes laid out, fitted and listed in steps; then the new tree takes the old one's place, and what
  * came and went in the meantime is put right. */
 #ifndef UMB_REBUILD_JOB_H
 #define UMB_REBUILD_JOB_H
 
-#include "tree_edit.h"
+#include "ready_tree.h"
 
 typedef enum umb_job_stage {
     UMB_JOB_IDLE,
     UMB_JOB_GATHER,
     UMB_JOB_SPLIT,
-    UMB_JOB_LAY_OUT,
-    UMB_JOB_READY /* nodes are laid out, without boxes */
+    UMB_JOB_LAY_OUT, /* nodes without boxes */
+    UMB_JOB_FIT,
+    UMB_JOB_LIST,
+    UMB_JOB_READY
 } umb_job_stage;
 
 /* A node to lay out: its split, number, and place in its parent. */
@@ -21,15 +23,15 @@ typedef struct umb_job_node {
 
 typedef struct umb_rebuild_job {
     umb_job_stage stage;
-    uint32_t cursor; /* of objects gathered */
-    uint32_t count, node_count, stack_count, log_count, root;
+    uint32_t cursor, occluder_cursor; /* of what is gathered */
+    uint32_t count, stack_count, log_count, root;
     umb_bvh_item *items;
     umb_bvh_split *splits;
     struct umb_bvh_steps *steps;
-    umb_node *nodes;
+    umb_ready_tree ready;
     umb_job_node *stack;
     uint32_t *log; /* references of what changed since it was gathered */
-    size_t item_capacity, split_capacity, node_capacity, stack_capacity, log_capacity;
+    size_t item_capacity, split_capacity, stack_capacity, log_capacity;
     double growth; /* of the tree in use since it was built: a running mean of samples; 1: none */
     uint32_t phase;
 } umb_rebuild_job;
@@ -43,7 +45,7 @@ void umb_rebuild_job_drop(umb_rebuild_job *job);
 double umb_rebuild_job_watch(umb_rebuild_job *job, const umb_tree_edit *e, const umb_committed *scene, bool structure);
 
 /* After the tree has followed a commit: look whether it has grown worse, begin if it has, and go on with the work.
- * True if a new tree has taken its place. Without memory, or when too much changes meanwhile, the work is dropped and
+ * True if a new tree has taken its place: its list of objects is in ready.objects. Without memory, or when too much changes meanwhile, the work is dropped and
  * the tree in use stays. */
 bool umb_rebuild_job_step(umb_rebuild_job *job, umb_tree_edit *e, const umb_committed *scene, bool structure);
 

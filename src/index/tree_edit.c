@@ -539,6 +539,65 @@ bool umb_tree_edit_adopt(umb_tree_edit *e, umb_node *nodes, uint32_t node_count,
     return true;
 }
 
+/* ---- exchange ------------------------------------------------------------------------------- */
+
+void umb_tree_stock_free(umb_tree_stock *s, const umb_allocator *a)
+{
+    umb_memory_free(a, s->nodes, s->node_capacity * sizeof *s->nodes);
+    umb_memory_free(a, s->below, s->below_capacity * sizeof *s->below);
+    umb_memory_free(a, s->places, s->place_capacity * sizeof *s->places);
+    umb_memory_free(a, s->occluder_places, s->occluder_capacity * sizeof *s->occluder_places);
+    umb_bvh_marks_free(&s->marks, a);
+    *s = (umb_tree_stock){0};
+}
+
+size_t umb_tree_stock_memory(const umb_tree_stock *s)
+{
+    return s->node_capacity * sizeof *s->nodes + s->below_capacity * sizeof *s->below +
+           (s->place_capacity + s->occluder_capacity) * sizeof(uint32_t) + umb_bvh_marks_memory(&s->marks);
+}
+
+void umb_tree_stock_forget(umb_tree_stock *s)
+{
+    forget_places(s->places, s->place_capacity);
+    forget_places(s->occluder_places, s->occluder_capacity);
+    umb_bvh_marks_clear(&s->marks);
+}
+
+bool umb_tree_edit_exchange(umb_tree_edit *e, umb_tree_stock *stock, const umb_committed *scene)
+{
+    umb_tree_stock old = {.nodes = e->nodes,
+                          .below = e->below,
+                          .marks = e->marks,
+                          .places = e->places,
+                          .occluder_places = e->occluder_places,
+                          .node_capacity = e->node_capacity,
+                          .below_capacity = e->below_capacity,
+                          .place_capacity = e->place_capacity,
+                          .occluder_capacity = e->occluder_capacity,
+                          .node_count = e->node_count,
+                          .slot_count = e->slot_count};
+    e->nodes = stock->nodes;
+    e->below = stock->below;
+    e->marks = stock->marks;
+    e->places = stock->places;
+    e->occluder_places = stock->occluder_places;
+    e->node_capacity = stock->node_capacity;
+    e->below_capacity = stock->below_capacity;
+    e->place_capacity = stock->place_capacity;
+    e->occluder_capacity = stock->occluder_capacity;
+    e->node_count = stock->node_count;
+    e->slot_count = stock->slot_count;
+    *stock = old;
+    umb_number_set_clear(&e->free);
+    e->worn_count = 0;
+    e->touched_count = UMB_TOUCHED_ALL;
+    e->stale = 0;
+    e->failed = !reserve_beside(e) || !umb_tree_edit_reserve_places(e, scene);
+    e->room = e->node_capacity;
+    return !e->failed;
+}
+
 void umb_tree_edit_free(umb_tree_edit *e)
 {
     const umb_allocator *a = e->allocator;

@@ -49,6 +49,23 @@ typedef struct umb_tree_edit {
  * tree to tree. Items are found by themselves. False without memory; the nodes are then still the caller's. */
 bool umb_tree_edit_adopt(umb_tree_edit *e, umb_node *nodes, uint32_t node_count, size_t node_capacity, bool several,
                          const umb_committed *scene);
+/* What makes a tree, without what changing it needs. */
+typedef struct umb_tree_stock {
+    umb_node *nodes;
+    umb_range *below;
+    umb_bvh_marks marks;
+    uint32_t *places, *occluder_places;
+    size_t node_capacity, below_capacity, place_capacity, occluder_capacity;
+    uint32_t node_count, slot_count;
+} umb_tree_stock;
+
+void umb_tree_stock_free(umb_tree_stock *stock, const umb_allocator *a);
+size_t umb_tree_stock_memory(const umb_tree_stock *stock);
+/* Nothing is anywhere, and no node is marked. */
+void umb_tree_stock_forget(umb_tree_stock *stock);
+/* Change places with what makes another tree, in which no item has several places and no number is free. Marks and lists come
+ * with it; volumes do not. False without memory: the tree has failed. */
+bool umb_tree_edit_exchange(umb_tree_edit *e, umb_tree_stock *stock, const umb_committed *scene);
 /* Counts, places and what boxes were built with, of a tree that has just been made node by node. */
 void umb_tree_edit_learn(umb_tree_edit *e);
 void umb_tree_edit_free(umb_tree_edit *e);
