@@ -15,7 +15,7 @@
 #include "support/failing.h"
 #include "support/random_boxes.h"
 
-enum { MOST = 4000 };
+enum { MOST = 4000, LARGE = 90000 };
 
 static const umb_index_update strategies[] = {UMB_UPDATE_REFIT, UMB_UPDATE_DELETE_INSERT, UMB_UPDATE_LCA,
                                               UMB_UPDATE_LAZY,  UMB_UPDATE_DEEPEST,       UMB_UPDATE_INCREMENTAL};
@@ -274,6 +274,66 @@ static void test_random_edits(void **state)
     }
 }
 
+/* What is listed below nodes is what is there. */
+static void check_lists(const grove *g)
+{
+    const umb_tree_edit *e = &g->edit;
+    const uint32_t *objects = g->job.ready.objects;
+    for (uint32_t k = 0; k < e->node_count; ++k) {
+        uint32_t at = e->below[k].first;
+        for (uint32_t slot = 0; slot < e->nodes[k].count && e->below[k].count != UMB_RANGE_STALE; ++slot) {
+            uint32_t ref = e->nodes[k].ref[slot];
+            if ((ref & UMB_REF_KIND) == UMB_REF_NODE) {
+                assert_true(e->below[ref].first == at);
+                at += e->below[ref].count;
+            } else if ((ref & UMB_REF_KIND) == UMB_REF_OBJECT) {
+                assert_true(objects[at++] == (ref & UMB_REF_NUMBER));
+            }
+        }
+        assert_true(e->below[k].count == UMB_RANGE_STALE || at == e->below[k].first + e->below[k].count);
+    }
+}
+
+/* A tree so large that each stage of making it anew takes several commits, in each of which things move, come and go. */
+static void test_made_beside(void **state)
+{
+    (void)state;
+    grove g;
+    uint32_t between[UMB_JOB_READY + 1] = {0};
+    grove_set_up(&g, UMB_UPDATE_INCREMENTAL, 71, NULL);
+    for (uint32_t i = 0; i < LARGE; ++i) {
+        add(&g);
+    }
+    for (uint32_t i = 0; i < 3000; ++i) {
+        umb_transform t = {{{1, 0, 0, (float)i}, {0, 1, 0, 1}, {0, 0, 1, 2}}};
+        uint32_t unused;
+        assert_int_equal(umb_scene_add_occluder(g.scene, g.shape, &t, &unused), UMB_OK);
+    }
+    start(&g);
+    for (uint32_t round = 0; round < 400 && g.rebuilt < 2; ++round) {
+        uint32_t before = g.rebuilt;
+        for (uint32_t i = 0; i < 1000; ++i) {
+            umb_aabb box = some_box(&g);
+            (void)umb_scene_move_object(g.scene, random_below(&g.seed, LARGE), NULL, &box);
+        }
+        for (uint32_t i = 0; i < round % 20; ++i) {
+            edit(&g);
+        }
+        follow(&g);
+        between[g.job.stage] += 1;
+        if (g.rebuilt > before) {
+            check_lists(&g);
+        }
+        check(&g);
+    }
+    assert_true(g.rebuilt == 2);
+    for (int stage = UMB_JOB_GATHER; stage <= UMB_JOB_FIT; ++stage) {
+        printf("# %u commits ended in stage %d\n", between[stage], stage);
+        assert_true(between[stage] > 0);
+    }
+    grove_tear_down(&g);
+}
+
 /* Everything goes, and comes again. */
 static void test_to_nothing(void **state)
 {
@@ -483,7 +543,7 @@ static void test_steady_memory(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_random_edits),  cmocka_unit_test(test_to_nothing),
+        cmocka_unit_test(test_random_edits),  cmocka_unit_test(test_made_beside), cmocka_unit_test(test_to_nothing),
         cmocka_unit_test(test_insertion),     cmocka_unit_test(test_motion),
         cmocka_unit_test(test_failing_allocations), cmocka_unit_test(test_steady_memory),
     };
