@@ -1044,7 +1044,7 @@ umb_result umb_cull(umb_culler *c, const umb_view *view, umb_visible_set *out)
     w.scene = umb_movers_begin(&c->movers, &c->allocator, w.scene, view->time, c->ops != NULL);
     bool ready = w.scene != NULL && reserve(c, view, w.tree, w.scene);
     if (ready) {
-        w.present = umb_filter_begin(&c->filter, view, w.scene);
+        w.present = umb_filter_begin(&c->filter, view, w.scene, w.tree);
         prepare_walk(&w, c, view);
         ready = c->ops == NULL || (chooses(c) ? find_chosen(&w) : c->ops->prepare(c->method, &w.map, w.scene)) == UMB_OK;
         ready = ready && (!umb_past_on(&c->past) ||

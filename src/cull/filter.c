@@ -25,9 +25,10 @@ void umb_filter_free(umb_filter *f, const umb_allocator *a)
     *f = (umb_filter){0};
 }
 
-const umb_filter *umb_filter_begin(umb_filter *f, const umb_view *view, const umb_committed *scene)
+const umb_filter *umb_filter_begin(umb_filter *f, const umb_view *view, const umb_committed *scene, const umb_tree *tree)
 {
     f->scene = scene;
+    f->tree = tree;
     f->mask = (umb_mask){view->mask, view->mask_all};
     f->hides = view->masked_hide;
     return view->mask != 0 && !view->masked_hide ? f : NULL;

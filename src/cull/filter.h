@@ -12,6 +12,7 @@
 
 typedef struct umb_filter {
     const umb_committed *scene; /* of the frame */
+    const umb_tree *tree;
     umb_mask mask;
     bool hides;                 /* what the mask leaves out hides nonetheless */
     bool restricted;            /* to candidates */
@@ -25,7 +26,7 @@ bool umb_filter_restrict(umb_filter *f, const umb_allocator *a, const uint32_t *
 void umb_filter_free(umb_filter *f, const umb_allocator *a);
 
 /* Begin a frame. Returns what is to be left out of its walk, or NULL: nothing. */
-const umb_filter *umb_filter_begin(umb_filter *f, const umb_view *view, const umb_committed *scene);
+const umb_filter *umb_filter_begin(umb_filter *f, const umb_view *view, const umb_committed *scene, const umb_tree *tree);
 
 /* True if something may have to be taken out of what is found. */
 static inline bool umb_filter_on(const umb_filter *f)
