@@ -39,7 +39,7 @@ typedef struct row {
     char table[32], label[32], scene[128], place[32];
     double size, height, outer;
     uint32_t resolution, umbrae;
-    bool half;
+    int way; /* 1: half-umbra, 2: no vertical */
     char theirs[3][16]; /* seconds, PVS, VS */
     bool done, is_thesis;
     answer ours, thesis; /* thesis: two squares, one interval */
@@ -112,7 +112,7 @@ static void read_row(char *fields[COLUMNS], row *r)
     r->resolution = (uint32_t)strtoul(fields[7], NULL, 10);
     r->umbrae = (uint32_t)strtoul(fields[8], NULL, 10);
     r->outer = strtod(fields[9], NULL);
-    r->half = fields[10][0] == '1';
+    r->way = fields[10][0] - '0';
     r->is_thesis = r->table[0] == '3';
     for (int k = 0; k < 3; ++k) {
         copy(r->theirs[k], sizeof r->theirs[k], fields[11 + k]);
@@ -237,11 +237,11 @@ static bool make_query(const study *s, const world *w, const row *r, umb_region_
 {
     static const umb_region_up ups[3] = {UMB_UP_X, UMB_UP_Y, UMB_UP_Z};
     int up = up_of(w->model);
-    *q = (umb_region_query){.up = ups[up],
+    *q = (umb_region_query){.up = r->way == 2 ? UMB_UP_NONE : ups[up],
                             .resolution = r->resolution,
                             .umbrae = r->umbrae,
                             .outer = r->outer,
-                            .half_umbra = r->half};
+                            .half_umbra = r->way == 1};
     for (uint32_t k = 0; k < s->place_count; ++k) {
         const place *p = &s->places[k];
         if (strcmp(p->scene, r->scene) != 0 || strcmp(p->name, r->place) != 0) {
@@ -349,6 +349,9 @@ static bool measure(study *s, world *w, row *r)
     }
     r->ours.misses = misses(w, a.pvs, a.pvs_count) + (s->refine ? misses(w, a.refined, a.refined_count) : 0);
     if (r->is_thesis) {
+        row thesis = *r;
+        thesis.way = r->way == 2 ? 0 : r->way;
+        (void)make_query(s, w, &thesis, &q);
         q.outer = 2.0;
         q.umbrae = 1;
         if (!ask(s, w, &q, false, &r->thesis, &a)) {

@@ -176,6 +176,7 @@ static void draw_way(dice *d, umb_region_query *q)
     q->umbrae = umbrae[dice_roll(d, 5)];
     q->half_umbra = dice_roll(d, 5) == 0;
     q->up = (umb_region_up)(dice_roll(d, 3) > 0 ? 0 : dice_roll(d, 3));
+    q->up = q->outer == 0.0 && !q->half_umbra && dice_roll(d, 2) == 0 ? UMB_UP_NONE : q->up;
 }
 
 static void run_scene(const char *name, bool weld, uint32_t cells, uint32_t rays, uint64_t seed)
@@ -282,7 +283,7 @@ static uint32_t hunt_with(const umb_umbra_kernels *kernels, uint32_t *hidden)
         w.region->kernels = kernels;
         dice d = {77};
         for (uint32_t i = 0; i < hunts[k].cells; ++i) {
-            umb_region_query q = {.resolution = 64, .umbrae = 1 + i % 4};
+            umb_region_query q = {.resolution = 64, .umbrae = 1 + i % 4, .up = i % 8 < 4 ? UMB_UP_Y : UMB_UP_NONE};
             umb_region_answer a;
             static const umb_aabb inside = {{-24, 0, -24}, {24, 10, 24}};
             draw_cell(&d, hunts[k].scene != NULL ? &w.model->bounds : &inside, &q);
@@ -354,7 +355,7 @@ static void test_two_sided(void **state)
     umb_error error;
     dice d = {17};
     open_model(&w, model_load("gen:city,triangles=5k", &(model_options){.two_sided = true}, &error), true, true);
-    for (uint32_t i = 0; i < cells(6, 20); ++i) {
+    for (uint32_t i = 0; i < cells(16, 30); ++i) {
         umb_region_query q = {0};
         draw_cell(&d, &w.model->bounds, &q);
         draw_way(&d, &q);
@@ -397,6 +398,7 @@ static void test_errors(void **state)
     static const umb_region_query bad[] = {
         {{1, 2, 3}, {0, 4, 5}, .up = UMB_UP_Y},      {{NAN, 0, 0}, {1, 1, 1}, .up = UMB_UP_Y},
         {{0, 0, 0}, {1, INFINITY, 1}, .up = UMB_UP_Y}, {{0, 0, 0}, {1, 1, 1}, .up = (umb_region_up)7},
+        {{0, 0, 0}, {1, 1, 1}, .up = UMB_UP_NONE, .outer = 2.0}, {{0, 0, 0}, {1, 1, 1}, .up = UMB_UP_NONE, .half_umbra = true},
         {{0, 0, 0}, {1, 1, 1}, .resolution = 63},    {{0, 0, 0}, {1, 1, 1}, .resolution = 2049},
         {{0, 0, 0}, {1, 1, 1}, .umbrae = 9},         {{0, 0, 0}, {1, 1, 1}, .outer = 1.0},
         {{0, 0, 0}, {1, 1, 1}, .outer = -2.0},       {{0, 0, 0}, {1, 1, 1}, .outer = NAN},

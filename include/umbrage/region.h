@@ -24,8 +24,10 @@ typedef struct umb_region_def {
     umb_error *error; /* text of failures; may be NULL; must outlive the engine */
 } umb_region_def;
 
-/* Which axis is the vertical: the method treats it apart from the other two. */
-typedef enum umb_region_up { UMB_UP_Y = 0, UMB_UP_Z = 1, UMB_UP_X = 2 } umb_region_up;
+/* Which axis is the vertical: the method treats it apart from the other two, which suits what stands on a ground.
+ * UMB_UP_NONE: there is none; rays are sorted by the axis that they run along most, into six maps instead of four. For
+ * scenes that extend up and down as much as sideways; then an occlusion map holds no slopes above 1. */
+typedef enum umb_region_up { UMB_UP_Y = 0, UMB_UP_Z = 1, UMB_UP_X = 2, UMB_UP_NONE = 3 } umb_region_up;
 
 /* What is asked. Zeroed but for the box it means the default. */
 typedef struct umb_region_query {
@@ -35,13 +37,13 @@ typedef struct umb_region_query {
     /* Pixels along each side of an occlusion map: 64 to 2048, rounded up to a multiple of 64; 0: 512. Maps by offset and slope
        have an eighth as many along the offset (a multiple of 64 too): all but near things need fewer there. */
     uint32_t resolution;
-    /* Intervals that are kept for each horizontal direction: 1 to 8; 0: 1 with half_umbra, else 2. */
+    /* Intervals that are kept for each horizontal direction: 1 to 8; 0: 1 with half_umbra, 8 without a vertical, else 2. */
     uint32_t umbrae;
     /* Width of the outer square over the inner one, above 1 and at most 1e6; 0: rays by offset and slope, the
-       limit of large squares, with half the maps. The thesis has 2. */
+       limit of large squares, with half the maps. The thesis has 2. Without a vertical: 0. */
     double outer;
     /* Only occluders that reach down to the lowest point of scene and cell, of which only the top is kept (the
-       thesis's half-umbra). Faster; hides less where things float, stand on pillars or hang. */
+       thesis's half-umbra). Faster; hides less where things float, stand on pillars or hang. Needs a vertical. */
     bool half_umbra;
     /* Sight-lines may start this far ahead of the eye: occluders within four times that distance of the cell are
        ignored. Then the set is right for views from within the cell whose near depth is at most near_depth and
@@ -103,7 +105,8 @@ typedef struct umb_region_pixel {
 /* Copy an occlusion map after the last umb_region_solve, to look at: *side rows by where rays cross the inner square (or
  * their offset from the cell's middle), each of *side pixels by where they cross the outer one (or their slope). Maps are numbered from 0:
  * of the rays towards + and - of the axis after up (x, y, z, x), then of the one after that; with squares four more, of
- * the rays that leave the cell sideways. Returns false, with the size only, when pixels is NULL or capacity is too
+ * the rays that leave the cell sideways; without a vertical of +x, -x, +y, -y, +z, -z, heights being along the axis two
+ * after. Returns false, with the size only, when pixels is NULL or capacity is too
  * small; with side 0 when there is no such map. */
 UMB_API bool umb_region_read_map(const umb_region *region, uint32_t map, umb_region_pixel *pixels, size_t capacity,
                                  uint32_t *side);

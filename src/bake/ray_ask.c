@@ -76,7 +76,9 @@ bool umb_ray_map_meets(const umb_ray_map *m, const umb_ray_shape *shape)
 {
     double u = umb_most(shape->u_max, m->frame->hu), error = m->frame->error;
     double far = m->offset_most + m->slope_most * (u + error) + 2.0 * error;
-    return shape->v_min <= far && shape->v_max >= -far;
+    double high = m->frame->steep * (u + m->frame->hu + 4.0 * error);
+    return shape->v_min <= far && shape->v_max >= -far && shape->z0 - m->frame->z1 <= high &&
+           m->frame->z0 - shape->z1 <= high;
 }
 
 /* Bounds of a shape over a rectangle of the map. */
@@ -142,11 +144,19 @@ static bool range_of_u(const umb_ray_map *m, const umb_ray_shape *shape, const b
     return true;
 }
 
+/* Of rays with |dz| <= |du| none meets what is above or below the cell before it is as far away. */
+static double least_u(const umb_ray_frame *f, const umb_ray_shape *shape)
+{
+    double away = umb_most(shape->z0 - f->z1, f->z0 - shape->z1);
+    return away - SLACK * fabs(away) - f->hu - 4.0 * f->error;
+}
+
 /* Upper bound of m, lower bound of M and of u for what is at these heights and distances, seen from a cell whose back
  * and front lie between the given abscissae. ub_max: nothing is hidden that may lie before it. */
 static bool bounds_of(const umb_ray_frame *f, const umb_ray_shape *shape, double u_min, double u_max,
                       double ua_max, double ub_min, double ub_max, umb_umbra_query *q)
 {
+    u_min = f->steep == 1.0f ? umb_most(u_min, least_u(f, shape)) : u_min;
     if (!(u_min > ub_max)) {
         return false;
     }
@@ -155,6 +165,8 @@ static bool bounds_of(const umb_ray_frame *f, const umb_ray_shape *shape, double
     double bottom = rise >= 0.0 ? rise / (u_max - ub_min) : rise / (u_min - ua_max);
     q->top = nextafterf((float)(top + SLACK * fabs(top)), INFINITY);
     q->bottom = nextafterf((float)(bottom - SLACK * fabs(bottom)), -INFINITY);
+    q->top = q->top < f->steep ? q->top : f->steep; /* no ray is steeper */
+    q->bottom = q->bottom > -f->steep ? q->bottom : -f->steep;
     q->depth = nextafterf((float)u_min, -INFINITY);
     return true;
 }

@@ -227,7 +227,7 @@ static void draw_run(band *d, uint32_t group, uint32_t from, uint32_t to)
     if (first == UMB_NONE) {
         return;
     }
-    umb_umbra_draw draw = {.umbra = &d->umbra, .umbrae = m->umbrae, .half = d->half, .tile_count = last - first + 1};
+    umb_umbra_draw draw = {.umbra = &d->umbra, .umbrae = m->umbrae, .half = d->half, .steep = m->frame->steep, .tile_count = last - first + 1};
     for (uint32_t j = first; j <= last; ++j) {
         uint32_t tile = d->row * m->columns + j;
         if (!wanted[j - group * UMB_TILE]) {

@@ -49,6 +49,7 @@ static void bounds_over(const umb_ray_map *m, const umb_ray_blocker *b, const um
         deepest = umb_most(deepest, b->vertices[i].u);
     }
     s->depth = nextafterf((float)(deepest + f->error), INFINITY);
+    s->steep = f->steep;
     *loss = umb_most((double)top_most - s->top, floor ? 0.0 : (double)s->bottom - bottom_least);
 }
 

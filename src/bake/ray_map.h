@@ -29,6 +29,7 @@ typedef struct umb_ray_frame {
     uint32_t axis_u, axis_v, axis_z;
     double sign;        /* of u along axis_u */
     double error;       /* bound of rounding of a coordinate in the frame */
+    float steep;        /* rays with |dz| > steep |du| are in other frames: 1, or INFINITY for none */
 } umb_ray_frame;
 
 /* In front of the squares' outer edge, alpha changes its sign at uo: nothing depends on that. */

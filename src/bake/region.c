@@ -75,12 +75,15 @@ static umb_result check_query(const umb_region *region, const umb_region_query *
             return umb_region_fail(region, UMB_ERROR_ARGUMENT, "the cell is inverted along %c", "xyz"[k]);
         }
     }
-    if ((unsigned)q->up > UMB_UP_X || q->umbrae > 8 ||
+    if ((unsigned)q->up > UMB_UP_NONE || q->umbrae > 8 ||
         (q->resolution != 0 && (q->resolution < 64 || q->resolution > 2048))) {
         return umb_region_fail(region, UMB_ERROR_ARGUMENT, "up, umbrae or resolution out of range");
     }
     if (q->outer != 0.0 && !(q->outer > 1.0 && q->outer <= 1e6)) {
         return umb_region_fail(region, UMB_ERROR_ARGUMENT, "outer must be above 1 and at most 1e6");
+    }
+    if (q->up == UMB_UP_NONE && (q->outer != 0.0 || q->half_umbra)) {
+        return umb_region_fail(region, UMB_ERROR_ARGUMENT, "squares and half umbrae need a vertical");
     }
     if (!(q->near_depth >= 0.0 && q->near_depth <= 1e15)) {
         return umb_region_fail(region, UMB_ERROR_ARGUMENT, "near_depth must be finite and not negative");
@@ -140,8 +143,8 @@ static void set_cell(umb_region *region, const umb_region_query *query)
     *q = *query;
     uint32_t resolution = q->resolution != 0 ? q->resolution : 512, side = UMB_TILE * UMB_TILE;
     q->resolution = (resolution + side - 1) / side * side;
-    q->umbrae = q->half_umbra ? 1 : q->umbrae != 0 ? q->umbrae : 2;
-    uint32_t up = q->up == UMB_UP_Y ? 1 : q->up == UMB_UP_Z ? 2 : 0;
+    q->umbrae = q->half_umbra ? 1 : q->umbrae != 0 ? q->umbrae : q->up == UMB_UP_NONE ? 8 : 2;
+    uint32_t up = q->up == UMB_UP_NONE ? UMB_NONE : q->up == UMB_UP_Y ? 1 : q->up == UMB_UP_Z ? 2 : 0;
     for (uint32_t k = 0; k < 3; ++k) {
         double middle = 0.5 * (q->min[k] + q->max[k]), least = 0x1p-22 * region->reach;
         if (k != up && !(q->max[k] - q->min[k] >= 2.0 * least)) {

@@ -9,6 +9,7 @@
 #include "umbrage/region.h"
 
 #define UMB_REGION_MAPS 8
+#define UMB_REGION_FRAMES 6
 
 struct umb_region {
     umb_index *index;
@@ -22,7 +23,8 @@ struct umb_region {
     double reach;           /* no coordinate of scene or cell is larger */
     bool solved;
 
-    umb_ray_frame frames[4];
+    umb_ray_frame frames[UMB_REGION_FRAMES]; /* two for each of the axes that rays are sorted by */
+    uint32_t frame_count;
     umb_ray_map maps[UMB_REGION_MAPS]; /* of frame k: k, and k + 4 with squares */
     uint32_t map_count;
     double floor; /* the lowest point of scene and cell */

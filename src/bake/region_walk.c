@@ -8,12 +8,12 @@
 
 /* ---- the queue: a heap of keys, each with what it is for ---------------------------------------- */
 
-/* By distance; at equal ones nodes, then occluders, then objects; then by number. */
-static uint64_t order_of(float key, uint32_t ref)
+/* What is waiting; at equal distances in this order, then by number. */
+typedef enum turn { NODE = 0, OCCLUDER = 1, OBJECT = 2, DRAWING = 3 } turn;
+
+static uint64_t order_of(float key, turn what, uint32_t number)
 {
-    uint32_t kind = ref & UMB_REF_KIND;
-    uint32_t rank = kind == UMB_REF_NODE ? 0 : kind == UMB_REF_OCCLUDER ? 1 : 2;
-    return (uint64_t)umb_sort_float(key) << 32 | (uint64_t)rank << 30 | (ref & UMB_REF_NUMBER);
+    return (uint64_t)umb_sort_float(key) << 32 | (uint64_t)what << 30 | number;
 }
 
 static float key_of(uint64_t order)
@@ -60,32 +60,34 @@ static uint64_t pop(umb_region *r)
 static void set_frames(umb_region *r)
 {
     const umb_region_query *q = &r->query;
+    bool none = q->up == UMB_UP_NONE;
     uint32_t up = q->up == UMB_UP_Y ? 1 : q->up == UMB_UP_Z ? 2 : 0;
-    uint32_t a = (up + 1) % 3, b = (up + 2) % 3;
     /* A coordinate less the centre is rounded once, by half a unit of at most twice the reach; points where an occluder
        is cut, three times more. */
     double error = 0x1p-49 * r->reach;
-    for (int k = 0; k < 4; ++k) {
+    r->frame_count = none ? 6 : 4;
+    for (uint32_t k = 0; k < r->frame_count; ++k) {
         umb_ray_frame *f = &r->frames[k];
-        *f = (umb_ray_frame){.axis_u = k < 2 ? a : b, .axis_v = k < 2 ? b : a, .axis_z = up,
-                             .sign = (k & 1) != 0 ? -1.0 : 1.0, .error = error};
+        uint32_t u = none ? k / 2 : (up + 1 + k / 2) % 3, z = none ? (u + 2) % 3 : up;
+        *f = (umb_ray_frame){.axis_u = u, .axis_v = 3 - u - z, .axis_z = z, .sign = (k & 1) != 0 ? -1.0 : 1.0,
+                             .error = error, .steep = none ? 1.0f : INFINITY};
         for (int i = 0; i < 3; ++i) {
             f->centre[i] = 0.5 * (q->min[i] + q->max[i]);
         }
         f->hu = umb_most(q->max[f->axis_u] - f->centre[f->axis_u], f->centre[f->axis_u] - q->min[f->axis_u]) + error;
         f->hv = umb_most(q->max[f->axis_v] - f->centre[f->axis_v], f->centre[f->axis_v] - q->min[f->axis_v]) + error;
-        f->z0 = q->min[up] - f->centre[up] - error;
-        f->z1 = q->max[up] - f->centre[up] + error;
+        f->z0 = q->min[f->axis_z] - f->centre[f->axis_z] - error;
+        f->z1 = q->max[f->axis_z] - f->centre[f->axis_z] + error;
     }
 }
 
 static umb_result begin_maps(umb_region *r)
 {
     const umb_region_query *q = &r->query;
-    r->map_count = q->outer != 0.0 ? 8 : 4;
+    r->map_count = q->outer != 0.0 ? 8 : r->frame_count;
     for (uint32_t k = 0; k < r->map_count; ++k) {
         umb_ray_kind kind = q->outer == 0.0 ? UMB_RAY_SLAB : k < 4 ? UMB_RAY_NEAR : UMB_RAY_FAR;
-        umb_result result = umb_ray_map_begin(&r->maps[k], &r->allocator, &r->frames[k % 4], kind, q->outer,
+        umb_result result = umb_ray_map_begin(&r->maps[k], &r->allocator, &r->frames[k % r->frame_count], kind, q->outer,
                                               q->resolution, q->umbrae);
         if (result != UMB_OK) {
             return result;
@@ -101,30 +103,40 @@ typedef struct opening {
     uint32_t map, tile;
 } opening;
 
+/* True if nothing of the hull of points of frame k can be seen. */
+static bool frame_hides(umb_region *r, uint32_t k, const umb_ray_point *p, uint32_t count, bool in_order, opening *open)
+{
+    const umb_ray_frame *f = &r->frames[k];
+    umb_ray_shape shape;
+    bool made = false;
+    if (!umb_ray_shape_measure(f, p, count, &shape)) {
+        return true;
+    }
+    for (open->map = k; open->map < r->map_count; open->map += r->frame_count) {
+        umb_ray_map *m = &r->maps[open->map];
+        if (!umb_ray_map_meets(m, &shape)) {
+            continue;
+        }
+        made = made || umb_ray_shape_outline(f, p, count, in_order, &shape);
+        if (made && !umb_ray_map_hides(m, r->kernels, &shape, &open->tile)) {
+            return false;
+        }
+    }
+    return true;
+}
+
 /* True if nothing of the hull of points (in the scene's coordinates) can be seen. in_order: they are corners of an outline,
  * as seen from above. */
 static bool points_hidden(umb_region *r, const double (*points)[3], uint32_t count, bool in_order, opening *open)
 {
     umb_ray_point p[UMB_RAY_POINTS];
-    umb_ray_shape shape;
-    for (uint32_t k = 0; k < 4; ++k) {
+    for (uint32_t k = 0; k < r->frame_count; ++k) {
         const umb_ray_frame *f = &r->frames[k];
         for (uint32_t i = 0; i < count; ++i) {
             p[i] = umb_ray_frame_point(f, points[i]);
         }
-        if (!umb_ray_shape_measure(f, p, count, &shape)) {
-            continue;
-        }
-        bool made = false;
-        for (open->map = k; open->map < r->map_count; open->map += 4) {
-            umb_ray_map *m = &r->maps[open->map];
-            if (!umb_ray_map_meets(m, &shape)) {
-                continue;
-            }
-            made = made || umb_ray_shape_outline(f, p, count, in_order, &shape);
-            if (made && !umb_ray_map_hides(m, r->kernels, &shape, &open->tile)) {
-                return false;
-            }
+        if (!frame_hides(r, k, p, count, in_order, open)) {
+            return false;
         }
     }
     return true;
@@ -135,7 +147,7 @@ static bool points_hidden_at(umb_region *r, const double (*points)[3], uint32_t 
 {
     umb_ray_point p[UMB_RAY_POINTS];
     umb_ray_shape shape;
-    const umb_ray_frame *f = &r->frames[at->map % 4];
+    const umb_ray_frame *f = r->maps[at->map].frame;
     for (uint32_t i = 0; i < count; ++i) {
         p[i] = umb_ray_frame_point(f, points[i]);
     }
@@ -146,15 +158,22 @@ static bool points_hidden_at(umb_region *r, const double (*points)[3], uint32_t 
 /* Four corners that have all the coordinates of a box. */
 static bool box_hidden(umb_region *r, const umb_aabb *box, opening *open)
 {
-    uint32_t up = r->frames[0].axis_z, a = r->frames[0].axis_u, b = r->frames[0].axis_v;
-    double p[4][3];
-    for (int i = 0; i < 4; ++i) {
-        p[i][a] = i == 0 || i == 3 ? box->min[a] : box->max[a];
-        p[i][b] = i < 2 ? box->min[b] : box->max[b];
-        p[i][up] = (i & 1) != 0 ? box->min[up] : box->max[up];
-    }
+    umb_ray_point p[4];
     r->answer.stats.queries += 1;
-    return points_hidden(r, (const double(*)[3])p, 4, true, open);
+    for (uint32_t k = 0; k < r->frame_count; ++k) {
+        const umb_ray_frame *f = &r->frames[k];
+        for (int i = 0; i < 4; ++i) {
+            double x[3];
+            x[f->axis_u] = i == 0 || i == 3 ? box->min[f->axis_u] : box->max[f->axis_u];
+            x[f->axis_v] = i < 2 ? box->min[f->axis_v] : box->max[f->axis_v];
+            x[f->axis_z] = (i & 1) != 0 ? box->min[f->axis_z] : box->max[f->axis_z];
+            p[i] = umb_ray_frame_point(f, x);
+        }
+        if (!frame_hides(r, k, p, 4, true, open)) {
+            return false;
+        }
+    }
+    return true;
 }
 
 /* The box, in the world, of a part's box under a transform whose world vertices are rounded. */
@@ -258,20 +277,23 @@ static void cut_convex(const umb_region *r, const umb_ray_frame *f, const umb_pi
     }
 }
 
-static void block_frame(umb_region *r, int k, const umb_piece *piece)
+static void block_frame(umb_region *r, uint32_t k, const umb_piece *piece)
 {
     const umb_ray_frame *f = &r->frames[k];
     umb_ray_point p[UMB_UMBRA_VERTICES];
     bool on_floor[UMB_UMBRA_VERTICES];
-    double most = -INFINITY;
+    double most = -INFINITY, low = INFINITY, high = -INFINITY;
     umb_ray_blocker b = {.convex = piece->convex, .floor = true};
     for (uint32_t i = 0; i < piece->count; ++i) {
         p[i] = umb_ray_frame_point(f, piece->points[i]);
         on_floor[i] = piece->points[i][f->axis_z] <= r->floor;
+        low = umb_least(low, p[i].z);
+        high = umb_most(high, p[i].z);
         most = umb_most(most, p[i].u);
     }
-    if (!(most > f->hu)) {
-        return;
+    double away = umb_most(low - f->z1, f->z0 - high);
+    if (!(most > f->hu) || away > f->steep * (most + f->hu)) {
+        return; /* behind the cell, or no ray of the frame is as steep */
     }
     if (piece->convex) {
         cut_convex(r, f, piece, p, on_floor, &b);
@@ -281,7 +303,7 @@ static void block_frame(umb_region *r, int k, const umb_piece *piece)
         b.count = piece->count;
         b.ring = piece->ring;
     }
-    for (uint32_t m = (uint32_t)k; m < r->map_count && b.count >= 2; m += 4) {
+    for (uint32_t m = k; m < r->map_count && b.count >= 2; m += r->frame_count) {
         umb_ray_map_block(&r->maps[m], r->kernels, &b, r->query.half_umbra);
     }
 }
@@ -290,7 +312,7 @@ static void block_piece(void *user, const umb_piece *piece)
 {
     umb_region *r = user;
     r->answer.stats.patches += 1;
-    for (int k = 0; k < 4; ++k) {
+    for (uint32_t k = 0; k < r->frame_count; ++k) {
         block_frame(r, k, piece);
     }
 }
@@ -323,12 +345,12 @@ static umb_result block(umb_region *r, const umb_occluder *o)
 
 /* ---- the walk ------------------------------------------------------------------------------------ */
 
-/* How far a box is from the cell's square, along the farther of the two axes. */
+/* How far a box is from the cell, along the farthest of the axes that rays are sorted by. */
 static float gap_of(const umb_region *r, const umb_aabb *b)
 {
     double gap = 0.0;
-    for (int i = 0; i < 2; ++i) {
-        uint32_t k = i == 0 ? r->frames[0].axis_u : r->frames[0].axis_v;
+    for (uint32_t i = 0; i < r->frame_count; i += 2) {
+        uint32_t k = r->frames[i].axis_u;
         gap = umb_most(gap, umb_most(r->query.min[k] - b->max[k], b->min[k] - r->query.max[k]));
     }
     return (float)gap;
@@ -343,7 +365,9 @@ static umb_result push_children(umb_region *r, const umb_node *n)
             box.min[k] = n->min[k][s];
             box.max[k] = n->max[k][s];
         }
-        umb_result result = push(r, order_of(gap_of(r, &box), n->ref[s]));
+        uint32_t kind = n->ref[s] & UMB_REF_KIND;
+        turn what = kind == UMB_REF_NODE ? NODE : kind == UMB_REF_OCCLUDER ? OCCLUDER : OBJECT;
+        umb_result result = push(r, order_of(gap_of(r, &box), what, n->ref[s] & UMB_REF_NUMBER));
         if (result != UMB_OK) {
             return result;
         }
@@ -365,32 +389,51 @@ static umb_aabb node_box(const umb_node *n)
     return box;
 }
 
+/* Where nothing stands on a ground an occluder is drawn once the walk has come to its far side: what is asked about before
+ * that lies beside it or in front of it, and would find intervals joined with it to begin too far away. */
+static umb_result block_later(umb_region *r, const umb_committed *c, uint32_t number)
+{
+    const umb_aabb *b = &c->occluders[number].bounds;
+    double far = 0.0;
+    if (r->query.up != UMB_UP_NONE) {
+        return block(r, &c->occluders[number]);
+    }
+    for (uint32_t i = 0; i < r->frame_count; i += 2) {
+        uint32_t k = r->frames[i].axis_u;
+        far = umb_most(far, umb_most(r->query.min[k] - b->min[k], b->max[k] - r->query.max[k]));
+    }
+    return push(r, order_of((float)far, DRAWING, number));
+}
+
 static umb_result visit(umb_region *r, const umb_tree *tree, const umb_committed *c, uint64_t order)
 {
-    uint32_t rank = (uint32_t)(order >> 30) & 3u, number = (uint32_t)order & UMB_REF_NUMBER;
+    uint32_t what = (uint32_t)(order >> 30) & 3u, number = (uint32_t)order & UMB_REF_NUMBER;
     opening open;
-    if (rank == 0) {
+    if (what == DRAWING) {
+        return block(r, &c->occluders[number]);
+    }
+    if (what == NODE) {
         const umb_node *n = umb_tree_node(tree, number);
         umb_aabb box = node_box(n);
         return box_hidden(r, &box, &open) ? UMB_OK : push_children(r, n);
     }
-    if (rank == 1) {
+    if (what == OCCLUDER) {
         const umb_occluder *o = &c->occluders[number];
-        return box_hidden(r, &o->bounds, &open) ? UMB_OK : block(r, o);
+        return box_hidden(r, &o->bounds, &open) ? UMB_OK : block_later(r, c, number);
     }
     const umb_object *o = &c->objects[number];
     if (object_hidden(r, o)) {
         return UMB_OK;
     }
     r->pvs[r->answer.pvs_count++] = number;
-    return o->occluder != UMB_NONE ? block(r, &c->occluders[o->occluder]) : UMB_OK;
+    return o->occluder != UMB_NONE ? block_later(r, c, o->occluder) : UMB_OK;
 }
 
 /* Nothing that far out can be seen any more, in any direction. */
 static bool all_closed(umb_region *r, const umb_tree *tree, float gap)
 {
-    uint32_t up = r->frames[0].axis_z;
     for (uint32_t m = 0; m < r->map_count; ++m) {
+        uint32_t up = r->maps[m].frame->axis_z;
         if (!umb_ray_map_closed(&r->maps[m], tree->bounds.min[up], tree->bounds.max[up], gap)) {
             return false;
         }
@@ -405,6 +448,7 @@ umb_result umb_region_walk(umb_region *r)
     set_frames(r);
     uint32_t up = r->frames[0].axis_z;
     r->floor = umb_least(r->query.min[up], tree->node_count > 0 ? tree->bounds.min[up] : r->query.min[up]);
+    r->floor = r->query.up == UMB_UP_NONE ? -INFINITY : r->floor;
     r->pieces.corners = (const double(*)[3])r->corners;
     r->pieces.reach = r->reach;
     r->pieces.emit = block_piece;

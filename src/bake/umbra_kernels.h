@@ -63,6 +63,7 @@ typedef struct umb_umbra_draw {
     uint64_t live[UMB_TILE]; /* pixels that rays go through */
     uint32_t tile_count, umbrae;
     bool half; /* keep tops and depths alone */
+    float steep; /* rays are not steeper than this: INFINITY or 1 */
 } umb_umbra_draw;
 
 /* Something asked about in one tile: in row r it touches lanes from[r] to to[r] (none: from > to). */
@@ -75,6 +76,7 @@ typedef struct umb_umbra_query {
 typedef struct umb_umbra_strip {
     float from[UMB_TILE], to[UMB_TILE];
     float top, top_far, bottom_far, bottom, depth;
+    float steep; /* as in umb_umbra_draw */
 } umb_umbra_strip;
 
 typedef struct umb_umbra_kernels {

@@ -14,6 +14,7 @@ run region gen:blocks,g=2 --cell 1,2,3,4,5,6 --umbrae 9
 run region gen:blocks,g=2 --cell 1,2,3,4,5,6 --outer 1
 run region gen:blocks,g=2 --cell 1,2,3,4,5,6 --near -1
 run region gen:blocks,g=2 --cell 1,2,3,4,5,6 --up 1,1,0
+run region gen:blocks,g=2 --cell 1,2,3,4,5,6 --all-round --outer 2
 run --nosuch
 run info
 run info --nosuch x

@@ -150,6 +150,9 @@ static void choose_settings(const model *m, soak_dice *dice, umb_region_query *q
     q->umbrae = soak_below(dice, 2) ? 0 : 1 + soak_below(dice, 8);
     q->outer = outers[soak_below(dice, 6)];
     q->half_umbra = soak_below(dice, 4) == 0;
+    if (q->outer == 0.0 && !q->half_umbra && soak_below(dice, 2) == 0) {
+        q->up = UMB_UP_NONE;
+    }
 }
 
 bool soak_cell(const model *m, const camera_path *path, uint64_t number, umb_region_query *out)

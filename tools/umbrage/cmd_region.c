@@ -44,6 +44,13 @@ static int make_query(const setup *s, const options *o, umb_region_query *out)
         out->min[k] = exact ? lower : nextafter(lower, -INFINITY);
         out->max[k] = exact ? upper : nextafter(upper, INFINITY);
     }
+    if (options_given(o, "all-round")) {
+        if (options_given(o, "up") || options_given(o, "outer") || options_given(o, "half-umbra")) {
+            return fail(o, EXIT_USAGE, "--all-round: there is no vertical then, so not with --up, --outer or --half-umbra");
+        }
+        out->up = UMB_UP_NONE;
+        return EXIT_DONE;
+    }
     return read_axis(o, options_given(o, "up") ? o->up : s->model->up, &out->up);
 }
 

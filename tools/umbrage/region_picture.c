@@ -43,8 +43,9 @@ static bitmap_color color_of(const umb_region_pixel *p)
 static void name_map(const umb_region_query *q, uint32_t map, char out[4])
 {
     int up = q->up == UMB_UP_Y ? 1 : q->up == UMB_UP_Z ? 2 : 0;
-    int axis = (up + 1 + (int)(map % 4) / 2) % 3;
-    (void)snprintf(out, 4, "%c%c%s", map % 2 ? '-' : '+', "xyz"[axis], map < 4 ? "" : "'");
+    bool none = q->up == UMB_UP_NONE;
+    int axis = none ? (int)map / 2 : (up + 1 + (int)(map % 4) / 2) % 3;
+    (void)snprintf(out, 4, "%c%c%s", map % 2 ? '-' : '+', "xyz"[axis], none || map < 4 ? "" : "'");
 }
 
 /* One map into its panel; each pixel of the panel takes the nearest of the map. */
@@ -89,7 +90,7 @@ static void lay_out(const bitmap *im, uint32_t maps, panels *p, uint32_t *width,
     *width = im->width;
     *height = im->height;
     if (2 * im->width >= 3 * im->height) {
-        p->columns = maps > 4 ? 4 : 2;
+        p->columns = maps > 6 ? 4 : maps > 4 ? 3 : 2;
         rows = maps / (uint32_t)p->columns;
         uint32_t all = (im->height - 1) / rows * (uint32_t)p->columns;
         uint32_t most = im->width / 2;
