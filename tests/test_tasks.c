@@ -383,7 +383,8 @@ static uint64_t draw_both(drawing *d, const umb_raster_kernels *kernels, const u
         const umb_occluder *o = &scene->occluders[i * 7u % scene->occluder_count];
         bool found[2], changed[2] = {false, false};
         for (int way = 0; way < 2; ++way) {
-            kernels->place(&d->scratch.silhouette, map, o);
+            kernels->approach(&d->scratch.silhouette, map, o);
+            kernels->place(&d->scratch.silhouette, map);
             found[way] = umb_mesh_image_find(&d->scratch, map, o);
             if (!found[way]) {
                 continue;

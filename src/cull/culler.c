@@ -4,8 +4,9 @@
  *     pop the nearest waiting entry; hidden by what was drawn since it was tested: drop it
  *       node:     eight boxes at once against the frustum, then the raster; push what is left
  *       occluder: draw it
- *       object:   test the parts of its shape; draw the occluder that it owns; let it wait until what
- *                 may be seen of it is settled; report it
+ *       object:   test the parts of its shape; draw the occluder that it owns; put it by until what may be
+ *                 seen of it is settled
+ *     now and then: those that were put by until then are asked about once more, and reported
  *
  * Best-first, not depth-first: an occluder that can hide the nearest point of a box has the smaller
  * key, so it is already in the buffer when the box's turn comes; and when an object is settled, all
@@ -40,10 +41,12 @@
 #define LEAST_PIXELS 2
 #define LEAST_MESH_PIXELS 4
 /* Where it is less than this, a sub-tile is hardly ever covered by one occluder alone. */
-#define DEPTH_PIXELS 16
+#define DEPTH_PIXELS 24
 /* Of so many drawings one may be unlikely to change anything; an object is counted when it is met and when it is drawn,
  * so that it is half of that. */
 #define UNLIKELY_SHARE 4
+/* After so many turns those are looked at that wait to be settled: together, so that their memory is fetched ahead. */
+#define TURNS_BETWEEN 12
 
 struct umb_culler {
     umb_allocator allocator;
@@ -87,9 +90,17 @@ typedef struct walk {
     float most_w;
     bool plain; /* each item has one slot, and none is too small: what is hidden is only counted */
     uint32_t drawn;
+    uint32_t turns; /* since those were looked at that wait to be settled */
     uint32_t unlikely; /* occluders wanted though they hardly change anything */
     umb_cull_stats stats;
 } walk;
+
+/* How many of eight bits are set. Not every processor that we are compiled for counts them by an instruction: the bits
+ * are spread over the nibbles of a word, and a product adds up these. */
+static inline uint32_t count_slots(uint32_t bits)
+{
+    return (bits * 0x08040201u >> 3 & 0x11111111u) * 0x11111111u >> 28;
+}
 
 /* True if the method chooses its occluders before the walk. */
 static bool chooses(const umb_culler *c)
@@ -266,6 +277,18 @@ static inline __attribute__((always_inline)) void fetch(const walk *w, uint32_t 
     }
 }
 
+/* The shape of an object that may be asked about as a body: the start of its block, which holds a small one's vertices. */
+static inline __attribute__((always_inline)) void fetch_shape(const walk *w, uint32_t ref)
+{
+    const umb_object *o = &w->scene->objects[ref & UMB_REF_NUMBER];
+    if ((ref & UMB_REF_KIND) == UMB_REF_OBJECT && o->body && !o->box) {
+        const char *p = (const char *)o->mesh;
+        for (int i = 0; i < 4; ++i) {
+            __builtin_prefetch(p + (size_t)64 * i);
+        }
+    }
+}
+
 /* Eight boxes that are tested together. */
 typedef struct opening {
     const umb_node *boxes;
@@ -321,23 +344,54 @@ static bool is_idle(walk *w, bool convex, const umb_waiting *item)
     return !wanted;
 }
 
-/* An object's first turn is for drawing it before what is behind. One that is idle already needs none: open pixels only
- * become fewer. Where objects move by themselves the first turn asks for their poses, too. */
-static bool may_skip_turn(walk *w, const umb_waiting *item)
+/* Images without a border of one pixel, but where they end at the raster's, and which of them is_idle() would ask about;
+ * *tiny: those that cover nothing. */
+static uint32_t shrink(const walk *w, const umb_projected *p, uint32_t *tiny, umb_projected *out)
 {
-    if ((item->ref & UMB_REF_KIND) != UMB_REF_OBJECT || w->culler->ops == NULL || w->scene->motion.count != 0 ||
-        w->drawn == 0 || !is_idle(w, true, item)) {
-        return false;
+    int32_t width = (int32_t)w->map.width, height = (int32_t)w->map.height;
+    uint32_t less = 0;
+    *tiny = 0;
+    for (uint32_t i = 0; i < UMB_NODE_WIDTH; ++i) {
+        int32_t wide = p->x1[i] - p->x0[i], high = p->y1[i] - p->y0[i], side = wide < high ? wide : high;
+        out->x0[i] = p->x0[i] + (p->x0[i] > 0);
+        out->y0[i] = p->y0[i] + (p->y0[i] > 0);
+        out->x1[i] = p->x1[i] - (p->x1[i] + 1 < width);
+        out->y1[i] = p->y1[i] - (p->y1[i] + 1 < height);
+        out->nearness[i] = -FLT_MAX;
+        *tiny |= (uint32_t)(side < LEAST_PIXELS) << i;
+        less |= (uint32_t)(side < DEPTH_PIXELS) << i;
     }
-    w->stats.idle += 1;
-    return true;
+    return less & ~*tiny;
 }
 
-static void push(walk *w, const opening *o, const umb_projected *p, uint32_t slot, uint16_t planes)
+/* An object's first turn is for drawing it before what is behind. One that is idle (is_idle, of all eight at once) already
+ * needs none: open pixels only become fewer. Where objects move by themselves the first turn asks for their poses, too. */
+static uint32_t skip_turns(walk *w, const umb_projected *p, uint32_t objects)
+{
+    objects &= p->testable;
+    if (objects == 0 || w->culler->ops == NULL || w->scene->motion.count != 0 || w->drawn == 0) {
+        return 0;
+    }
+    umb_projected within;
+    uint32_t tiny, some = shrink(w, p, &tiny, &within) & objects, skips = tiny & objects;
+    w->stats.queries += count_slots(some);
+    some = some != 0 ? w->culler->ops->hides(w->culler->method, &within, some) : 0;
+    for (; some != 0; some &= some - 1) {
+        uint32_t slot = (uint32_t)__builtin_ctz(some);
+        umb_image image = image_of(p, slot);
+        bool wanted = UNLIKELY_SHARE * w->unlikely < w->drawn && !is_closed(w, &image.rect, 0);
+        w->unlikely += wanted;
+        skips |= (uint32_t)!wanted << slot;
+    }
+    w->stats.idle += count_slots(skips);
+    return skips;
+}
+
+static umb_waiting *fill_in(walk *w, const opening *o, const umb_projected *p, uint32_t slot, uint32_t *taken)
 {
     umb_heap *heap = &w->culler->heap;
-    uint32_t taken = umb_heap_take(heap);
-    umb_waiting *item = &heap->slots[taken];
+    *taken = umb_heap_take(heap);
+    umb_waiting *item = &heap->slots[*taken];
     item->nearest = p->w_min[slot];
     item->settled = p->w_max[slot] < w->most_w ? p->w_max[slot] : w->most_w;
     item->ref = o->boxes->ref[slot];
@@ -345,12 +399,28 @@ static void push(walk *w, const opening *o, const umb_projected *p, uint32_t slo
     item->stamp = w->drawn;
     item->image = image_of(p, slot);
     item->part = 0;
-    item->planes = planes;
+    item->planes = o->child_planes[slot];
     item->testable = (p->testable >> slot & 1u) != 0;
     item->asked = false;
-    item->waited = may_skip_turn(w, item);
-    umb_heap_push(heap, item->waited ? item->settled : item->nearest, taken);
+    item->waited = false;
     fetch(w, item->ref);
+    return item;
+}
+
+/* Have the boxes of a mask wait: those of skips have had their turn. */
+static void push(walk *w, const opening *o, const umb_projected *p, uint32_t left, uint32_t skips)
+{
+    umb_heap *heap = &w->culler->heap;
+    uint32_t taken;
+    for (uint32_t turns = left & ~skips; turns != 0; turns &= turns - 1) {
+        const umb_waiting *item = fill_in(w, o, p, (uint32_t)__builtin_ctz(turns), &taken);
+        umb_heap_push(heap, item->nearest, taken);
+    }
+    for (uint32_t later = left & skips; later != 0; later &= later - 1) {
+        umb_waiting *item = fill_in(w, o, p, (uint32_t)__builtin_ctz(later), &taken);
+        item->waited = true;
+        umb_heap_put_by(heap, item->settled, taken);
+    }
 }
 
 /* True if it need not be asked about. */
@@ -380,7 +450,7 @@ static uint32_t all_known(const umb_past *past, const umb_node *boxes, uint32_t 
 static uint32_t ask(walk *w, const umb_projected *projected, uint32_t mask)
 {
     const umb_culler *c = w->culler;
-    w->stats.queries += (uint32_t)__builtin_popcount(mask);
+    w->stats.queries += count_slots(mask);
     return mask != 0 ? c->ops->hides(c->method, projected, mask) : 0;
 }
 
@@ -393,7 +463,7 @@ static uint32_t ask_by_neighbours(walk *w, const umb_projected *projected, uint3
         umb_image image = image_of(projected, slot);
         hides |= umb_past_hides(past, &image) ? 1u << slot : 0;
     }
-    w->stats.saved += (uint32_t)__builtin_popcount(hides);
+    w->stats.saved += count_slots(hides);
     uint32_t found = ask(w, projected, mask & ~hides);
     for (uint32_t left = found; left != 0; left &= left - 1) {
         umb_image image = image_of(projected, (uint32_t)__builtin_ctz(left));
@@ -415,14 +485,22 @@ static bool meet(walk *w, uint32_t ref)
     return !umb_once_has(w->once, *entry, UMB_ONCE_SETTLED);
 }
 
-/* A bit for each slot of a kind; empty slots are none. */
-static uint32_t slots_of_kind(const umb_node *boxes, uint32_t kind)
+/* Which of the boxes in left are to wait, where items have several slots, or may be too small. */
+static uint32_t sift(walk *w, const umb_node *boxes, uint32_t left, uint32_t hides)
 {
-    uint32_t slots = 0;
-    for (uint32_t slot = 0; slot < UMB_NODE_WIDTH; ++slot) {
-        slots |= (uint32_t)((boxes->ref[slot] & UMB_REF_KIND) == kind) << slot;
+    uint32_t waits = 0;
+    for (; left != 0; left &= left - 1) {
+        uint32_t slot = (uint32_t)__builtin_ctz(left), ref = boxes->ref[slot];
+        if (!meet(w, ref)) {
+            continue;
+        }
+        if ((hides >> slot & 1u) != 0) {
+            count_hidden(w, ref);
+        } else if (!too_small(w, boxes, slot)) {
+            waits |= 1u << slot;
+        }
     }
-    return slots;
+    return waits;
 }
 
 /* Test eight boxes and have those wait that may be seen. */
@@ -444,31 +522,23 @@ static void open_boxes(walk *w, opening *o)
     uint32_t hides = projected.beside & left, sure = 0;
     if (umb_past_knows(&c->past)) {
         sure = all_known(&c->past, boxes, left & ~hides);
-        w->stats.saved += w->drawn != 0 ? (uint32_t)__builtin_popcount(sure & projected.testable) : 0;
+        w->stats.saved += w->drawn != 0 ? count_slots(sure & projected.testable) : 0;
     }
     if (c->ops != NULL && w->drawn != 0) {
         uint32_t mask = projected.testable & left & ~hides & ~sure;
         hides |= umb_past_has(&c->past, UMB_COHERENCE_PROPAGATION) ? ask_by_neighbours(w, &projected, mask)
                                                                      : ask(w, &projected, mask);
     }
+    uint32_t objects = projected.objects;
     if (w->plain) {
-        uint32_t objects = slots_of_kind(boxes, UMB_REF_OBJECT), nodes = slots_of_kind(boxes, UMB_REF_NODE);
-        w->stats.in_frustum += (uint32_t)__builtin_popcount(left & objects);
-        w->stats.hidden_objects += (uint32_t)__builtin_popcount(left & hides & objects);
-        w->stats.hidden_nodes += (uint32_t)__builtin_popcount(left & hides & nodes);
+        w->stats.in_frustum += count_slots(left & objects);
+        w->stats.hidden_objects += count_slots(left & hides & objects);
+        w->stats.hidden_nodes += count_slots(left & hides & projected.nodes);
         left &= ~hides;
+    } else {
+        left = sift(w, boxes, left, hides);
     }
-    for (; left != 0; left &= left - 1) {
-        uint32_t slot = (uint32_t)__builtin_ctz(left), ref = boxes->ref[slot];
-        if (!w->plain && !meet(w, ref)) {
-            continue;
-        }
-        if ((hides >> slot & 1u) != 0) {
-            count_hidden(w, ref);
-        } else if (w->plain || !too_small(w, boxes, slot)) {
-            push(w, o, &projected, slot, o->child_planes[slot]);
-        }
-    }
+    push(w, o, &projected, left, skip_turns(w, &projected, left & objects));
 }
 
 static void open_node(walk *w, uint32_t number, uint16_t planes)
@@ -616,7 +686,7 @@ static void meet_mover(walk *w, const umb_waiting *item)
  * hidden. One that hides by its own shape is asked about at once, too, because it is to be drawn
  * before what is behind it; its wait then ends where what may be seen of it ends. True if it
  * waits. */
-static bool visit_object(walk *w, umb_waiting *item, const umb_heap_entry *entry)
+static bool visit_object(walk *w, umb_waiting *item, float key)
 {
     const umb_object *o = &w->scene->objects[item->ref & UMB_REF_NUMBER];
     umb_object posed;
@@ -636,7 +706,7 @@ static bool visit_object(walk *w, umb_waiting *item, const umb_heap_entry *entry
     }
     bool first = !item->waited, hides = o->occluder != UMB_NONE;
     bool can_wait = w->culler->ops != NULL;
-    bool settled = !can_wait || !(item->settled > umb_heap_key(entry));
+    bool settled = !can_wait || !(item->settled > key);
     bool early = first && hides;
     bool ask = settled ? !item->asked || item->stamp != w->drawn : early;
     item->waited = true;
@@ -651,12 +721,11 @@ static bool visit_object(walk *w, umb_waiting *item, const umb_heap_entry *entry
     if (first) {
         draw(w, o->occluder, box, item);
     }
-    if (!can_wait || !(item->settled > umb_heap_key(entry))) { /* asking may have moved it either way */
+    if (!can_wait || !(item->settled > key)) { /* asking may have moved it either way */
         report(w, item);
         return false;
     }
     item->stamp = w->drawn;
-    umb_heap_push(&w->culler->heap, item->settled, entry->slot);
     return true;
 }
 
@@ -688,30 +757,86 @@ static bool volume_shows(walk *w, const umb_waiting *item)
     return !hides;
 }
 
-static void run_queue(walk *w)
+/* Those whose time has come go to the front, and what will be wanted of them is fetched. How many. */
+static size_t gather_due(walk *w, float key)
 {
     umb_heap *heap = &w->culler->heap;
-    while (heap->count > 0) {
-        umb_heap_entry entry = umb_heap_pop(heap);
-        umb_waiting *item = &heap->slots[entry.slot];
+    size_t due = 0;
+    for (size_t i = 0; i < heap->by_count; ++i) {
+        umb_put_by e = heap->by[i];
+        if (!(e.until > key)) {
+            fetch_shape(w, heap->slots[e.slot].ref);
+            heap->by[i] = heap->by[due];
+            heap->by[due++] = e;
+        }
+    }
+    return due;
+}
+
+/* Report those that were put by until now, unless they are hidden by now; key: of the turn that comes next. */
+static void decide_due(walk *w, float key)
+{
+    umb_heap *heap = &w->culler->heap;
+    size_t due = gather_due(w, key), kept = 0;
+    for (size_t i = 0; i < due; ++i) {
+        umb_put_by e = heap->by[i];
+        umb_waiting *item = &heap->slots[e.slot];
         bool waits = false;
         if (is_settled(w, item->ref)) {
             waits = false;
         } else if (found_hidden(w, item)) {
             count_hidden(w, item->ref);
-        } else if ((item->ref & UMB_REF_KIND) == UMB_REF_NODE) {
-            if (w->tree->volumes == NULL || volume_shows(w, item)) {
-                open_node(w, item->ref & UMB_REF_NUMBER, item->planes);
-            }
-        } else if ((item->ref & UMB_REF_KIND) == UMB_REF_OCCLUDER) {
-            draw(w, item->ref & UMB_REF_NUMBER, NULL, item);
         } else {
-            waits = visit_object(w, item, &entry);
+            waits = visit_object(w, item, key);
         }
-        if (!waits) {
-            umb_heap_give(heap, entry.slot);
+        if (waits) {
+            heap->by[kept++] = (umb_put_by){item->settled, e.slot};
+        } else {
+            umb_heap_give(heap, e.slot);
         }
     }
+    umb_heap_close_gap(heap, kept, due);
+    w->turns = 0;
+}
+
+/* One turn. */
+static void take_turn(walk *w, umb_heap_entry entry)
+{
+    umb_heap *heap = &w->culler->heap;
+    umb_waiting *item = &heap->slots[entry.slot];
+    if (is_settled(w, item->ref)) {
+        umb_heap_give(heap, entry.slot);
+        return;
+    }
+    if (found_hidden(w, item)) {
+        count_hidden(w, item->ref);
+    } else if ((item->ref & UMB_REF_KIND) == UMB_REF_NODE) {
+        if (w->tree->volumes == NULL || volume_shows(w, item)) {
+            open_node(w, item->ref & UMB_REF_NUMBER, item->planes);
+        }
+    } else if ((item->ref & UMB_REF_KIND) == UMB_REF_OCCLUDER) {
+        draw(w, item->ref & UMB_REF_NUMBER, NULL, item);
+    } else if (visit_object(w, item, umb_heap_key(&entry))) {
+        umb_heap_put_by(heap, item->settled, entry.slot);
+        return;
+    }
+    umb_heap_give(heap, entry.slot);
+}
+
+static void run_queue(walk *w)
+{
+    umb_heap *heap = &w->culler->heap;
+    while (heap->count > 0) {
+        umb_heap_entry entry = umb_heap_pop(heap);
+        if (heap->count > 0) {
+            fetch_shape(w, heap->slots[heap->entries[0].slot].ref);
+        }
+        if (++w->turns == TURNS_BETWEEN) {
+            decide_due(w, umb_heap_key(&entry));
+        }
+        take_turn(w, entry);
+    }
+    decide_due(w, INFINITY);
 }
 
 /* The occluders of the last frame's list, eight at a time, as if they were all that there is: nearest first, and
@@ -850,7 +975,7 @@ static void prepare_walk(walk *w, umb_culler *c, const umb_view *view)
     w->culler = c;
     w->view = view;
     w->once = w->tree->several ? &c->once : NULL;
-    w->drawn = w->unlikely = 0;
+    w->drawn = w->unlikely = w->turns = 0;
     w->plain = w->once == NULL && !(view->min_pixels > 0.0);
     w->stats = (umb_cull_stats){0};
     umb_frustum_prepare(&w->frustum, view);

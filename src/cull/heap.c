@@ -6,6 +6,7 @@ bool umb_heap_reserve(umb_heap *h, const umb_allocator *a, size_t count)
 {
     return umb_memory_reserve(a, (void **)&h->entries, &h->entry_capacity, count,
                               sizeof *h->entries) &&
+           umb_memory_reserve(a, (void **)&h->by, &h->by_capacity, count, sizeof *h->by) &&
            umb_memory_reserve(a, (void **)&h->slots, &h->slot_capacity, count, sizeof *h->slots) &&
            umb_memory_reserve(a, (void **)&h->free, &h->free_capacity, count, sizeof *h->free);
 }
@@ -13,6 +14,7 @@ bool umb_heap_reserve(umb_heap *h, const umb_allocator *a, size_t count)
 void umb_heap_free(umb_heap *h, const umb_allocator *a)
 {
     umb_memory_free(a, h->entries, h->entry_capacity * sizeof *h->entries);
+    umb_memory_free(a, h->by, h->by_capacity * sizeof *h->by);
     umb_memory_free(a, h->slots, h->slot_capacity * sizeof *h->slots);
     umb_memory_free(a, h->free, h->free_capacity * sizeof *h->free);
     memset(h, 0, sizeof *h);

@@ -30,12 +30,19 @@ typedef struct umb_heap_entry {
     uint32_t slot;
 } umb_heap_entry;
 
+/* Put by, in no order: its turn has been, and it waits until a W is passed. */
+typedef struct umb_put_by {
+    float until;
+    uint32_t slot;
+} umb_put_by;
+
 typedef struct umb_heap {
     umb_heap_entry *entries;
+    umb_put_by *by;
     umb_waiting *slots;
     uint32_t *free; /* slots to use again */
-    size_t count, free_count, used; /* used: slots ever handed out in this frame */
-    size_t entry_capacity, slot_capacity, free_capacity;
+    size_t count, by_count, free_count, used; /* used: slots ever handed out in this frame */
+    size_t entry_capacity, by_capacity, slot_capacity, free_capacity;
 } umb_heap;
 
 /* Orders like the float does; -0 before 0. */
@@ -68,7 +75,7 @@ void umb_heap_free(umb_heap *h, const umb_allocator *a);
 /* Forget everything. */
 static inline void umb_heap_clear(umb_heap *h)
 {
-    h->count = h->free_count = h->used = 0;
+    h->count = h->by_count = h->free_count = h->used = 0;
 }
 
 /* A slot to fill in and push. Room must have been reserved, here and below. */
@@ -81,6 +88,19 @@ static inline uint32_t umb_heap_take(umb_heap *h)
 static inline void umb_heap_give(umb_heap *h, uint32_t slot)
 {
     h->free[h->free_count++] = slot;
+}
+
+static inline void umb_heap_put_by(umb_heap *h, float until, uint32_t slot)
+{
+    h->by[h->by_count++] = (umb_put_by){until, slot};
+}
+
+/* Of those put by, take out from first on, up to before end; the last ones move there. */
+static inline void umb_heap_close_gap(umb_heap *h, size_t first, size_t end)
+{
+    size_t gone = end - first, after = h->by_count - end, moved = after < gone ? after : gone;
+    memmove(h->by + first, h->by + h->by_count - moved, moved * sizeof *h->by);
+    h->by_count -= gone;
 }
 
 void umb_heap_push(umb_heap *h, float key, uint32_t slot);

@@ -31,6 +31,7 @@ typedef struct umb_projected {
     float w_min[UMB_NODE_WIDTH], w_max[UMB_NODE_WIDTH];
     uint32_t testable; /* a bit for each slot */
     uint32_t beside;   /* testable, and no point of it is on the raster */
+    uint32_t nodes, objects; /* slots that name such */
 } umb_projected;
 
 /* What a projector is made from. */

@@ -91,6 +91,10 @@ static uint32_t cull(const umb_frustum *f, const umb_node *node, uint16_t planes
         todo = 1u << *remember;
     }
     *tests = 0;
+    if (planes == 0) { /* as most that lie deep in the frustum */
+        memset(left, 0, LANES * sizeof(left[0]));
+        return 0xFFu << node->count & 0xFFu;
+    }
     approach(f, node, &b);
     for (uint32_t done = 0; todo != 0; todo = planes & ~done) {
         uint32_t k = (uint32_t)__builtin_ctz(todo);
@@ -335,8 +339,11 @@ static inline void project_perspective(const umb_node *node, const umb_projector
 
 static void project(const umb_node *node, const umb_projector *p, umb_projected *out)
 {
-    out->testable = out->beside = 0;
+    out->testable = out->beside = out->nodes = out->objects = 0;
     for (int at = 0; at < 8; at += UMB_LANES) {
+        umb_iv kind = umb_iv_load(node->ref + at) & (int32_t)UMB_REF_KIND;
+        out->nodes |= umb_iv_bits(kind == (int32_t)UMB_REF_NODE) << at;
+        out->objects |= umb_iv_bits(kind == (int32_t)UMB_REF_OBJECT) << at;
         if (p->orthographic != 0) {
             project_parallel(node, p, at, out);
         } else if (p->vertical == 0) {

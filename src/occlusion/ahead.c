@@ -114,7 +114,8 @@ static void find_image(const umb_ahead *a, umb_ahead_helper *h, umb_ahead_image 
 {
     const umb_occluder *o = &a->scene->occluders[image->occluder];
     umb_silhouette *s = &h->scratch.silhouette;
-    a->kernels->place(s, a->map, o);
+    a->kernels->approach(s, a->map, o);
+    a->kernels->place(s, a->map);
     image->drawn = umb_mesh_image_find(&h->scratch, a->map, o);
     image->list = (umb_tile_list){.tiles = h->tiles + h->used,
                                   .numbers = h->numbers + h->used,

@@ -17,7 +17,8 @@ typedef struct raster {
     umb_mesh_scratch scratch;
     umb_convex convex; /* of the occluder convex_of, UMB_NONE: of none */
     umb_convex_result convex_found;
-    uint32_t convex_of, placed; /* placed: the occluder whose corners the scratch holds */
+    uint32_t convex_of;
+    uint32_t approached, placed; /* the occluder whose vertices the scratch holds: relative to the eye; on the raster */
     umb_ahead ahead;
 } raster;
 
@@ -43,12 +44,18 @@ static void destroy(void *state)
     umb_memory_free(&a, r, sizeof *r);
 }
 
+/* The scratch is used for something else. */
+static void forget(raster *r)
+{
+    r->convex_of = r->approached = r->placed = UMB_NONE;
+}
+
 static umb_result prepare(void *state, const umb_raster_map *map, const umb_committed *scene)
 {
     raster *r = state;
     r->map = *map;
     r->scene = scene;
-    r->convex_of = r->placed = UMB_NONE;
+    forget(r);
     if (!umb_coverage_resize(&r->coverage, &r->allocator, map->width, map->height) ||
         !umb_mesh_scratch_reserve(&r->scratch, &r->allocator, map, scene)) {
         return UMB_ERROR_MEMORY;
@@ -91,12 +98,23 @@ static bool open_at(const void *state, double x, double y, double nearness)
     return (t->mask[r] >> bit & 1u) == 0 || t->z[4 * (r / 4) + bit / 8] < nearness;
 }
 
-static void place(raster *r, uint32_t occluder)
+/* o: the occluder, or what of it its object says. */
+static void approach(raster *r, uint32_t occluder, const umb_occluder *o)
+{
+    if (r->approached != occluder) {
+        forget(r);
+        r->approached = occluder;
+        r->kernels->approach(&r->scratch.silhouette, &r->map, o);
+    }
+}
+
+/* The same again. */
+static void place(raster *r, uint32_t occluder, const umb_occluder *o)
 {
     if (r->placed != occluder) {
+        approach(r, occluder, o);
         r->placed = occluder;
-        r->convex_of = UMB_NONE;
-        r->kernels->place(&r->scratch.silhouette, &r->map, &r->scene->occluders[occluder]);
+        r->kernels->place(&r->scratch.silhouette, &r->map);
     }
 }
 
@@ -104,7 +122,7 @@ static void place(raster *r, uint32_t occluder)
 static umb_convex_result find_convex(raster *r, uint32_t occluder)
 {
     const umb_silhouette *s = &r->scratch.silhouette;
-    place(r, occluder);
+    place(r, occluder, &r->scene->occluders[occluder]);
     if (r->convex_of != occluder) {
         r->convex_of = occluder;
         r->convex_found = !s->any  ? UMB_CONVEX_NOTHING
@@ -112,18 +130,6 @@ static umb_convex_result find_convex(raster *r, uint32_t occluder)
                                    : r->kernels->find_convex(&r->map, &r->scene->occluders[occluder], s, &r->convex);
     }
     return r->convex_found;
-}
-
-/* Most bodies that may be seen show a corner. */
-static bool shows_corner(const raster *r)
-{
-    const umb_silhouette *s = &r->scratch.silhouette;
-    for (uint32_t v = 0; v < s->vertex_count; ++v) {
-        if (open_at(r, s->x[v], s->y[v], s->near_least[v])) {
-            return true;
-        }
-    }
-    return false;
 }
 
 static bool is_body(const umb_mesh *mesh)
@@ -139,14 +145,14 @@ static bool hides_body(void *state, const umb_object *o, const umb_image *image)
     if (!is_body(o->mesh)) {
         return false;
     }
-    if (r->placed != o->occluder) {
-        const umb_occluder body = {.mesh = o->mesh, .transform = o->transform, .identity = o->identity};
-        r->placed = o->occluder;
-        r->convex_of = UMB_NONE;
-        r->kernels->place(&r->scratch.silhouette, &r->map, &body);
+    const umb_occluder body = {.mesh = o->mesh, .transform = o->transform, .identity = o->identity};
+    umb_silhouette *s = &r->scratch.silhouette;
+    approach(r, o->occluder, &body);
+    if (r->placed != o->occluder && r->kernels->shows_corner(&r->coverage, s, &r->map)) { /* as most that may be seen do */
+        return false;
     }
-    if (!r->scratch.silhouette.any || r->scratch.silhouette.cut || shows_corner(r) ||
-        find_convex(r, o->occluder) == UMB_CONVEX_OTHER) {
+    place(r, o->occluder, &body);
+    if (!s->any || s->cut || find_convex(r, o->occluder) == UMB_CONVEX_OTHER) {
         return false;
     }
     return r->kernels->hides_convex(&r->coverage, &r->map, &r->convex, image->rect);
@@ -166,8 +172,9 @@ static uint32_t occlude_with_mesh(raster *r, uint32_t occluder, umb_cull_stats *
     } else {
         const umb_occluder *o = &r->scene->occluders[occluder];
         umb_silhouette *s = &r->scratch.silhouette;
-        r->convex_of = r->placed = UMB_NONE;
-        r->kernels->place(s, &r->map, o);
+        forget(r);
+        r->kernels->approach(s, &r->map, o);
+        r->kernels->place(s, &r->map);
         drawn = umb_mesh_image_find(&r->scratch, &r->map, o);
         edge_count = drawn ? s->edge_count : 0;
         if (drawn) {
@@ -205,7 +212,7 @@ static uint32_t occlude(void *state, uint32_t occluder, const umb_aabb *box, umb
     }
     umb_convex_result found = find_convex(r, occluder);
     if (found == UMB_CONVEX_OTHER) {
-        r->convex_of = r->placed = UMB_NONE;
+        forget(r);
         if (!umb_mesh_image_find(&r->scratch, &r->map, o)) {
             return 0;
         }

@@ -49,8 +49,12 @@ typedef struct umb_raster_kernels {
     uint32_t (*hides)(const umb_coverage *c, const umb_projected *boxes, uint32_t mask);
     /* The same for one rectangle. */
     bool (*hides_rect)(const umb_coverage *c, umb_pixel_rect rect, float nearness);
-    /* Place an occluder's vertices: all of the silhouette's vertex arrays, and its numbers up to most. */
-    void (*place)(umb_silhouette *s, const umb_raster_map *map, const umb_occluder *occluder);
+    /* Place an occluder's vertices in two steps: relative to the eye, and what of it is cut away; then the other vertex
+       arrays of the silhouette, and its numbers up to most. */
+    void (*approach)(umb_silhouette *s, const umb_raster_map *map, const umb_occluder *occluder);
+    /* Between the two, of a body: true if a vertex is open, or cut away. */
+    bool (*shows_corner)(const umb_coverage *c, umb_silhouette *s, const umb_raster_map *map);
+    void (*place)(umb_silhouette *s, const umb_raster_map *map);
     /* mesh->convex, at most UMB_CONVEX_TRIANGLES, placed, and no vertex is cut away. */
     umb_convex_result (*find_convex)(const umb_raster_map *map, const umb_occluder *occluder,
                                      const umb_silhouette *s, umb_convex *out);

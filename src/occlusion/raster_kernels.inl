@@ -144,15 +144,36 @@ static bool hides_rect(const umb_coverage *c, umb_pixel_rect rect, float nearnes
                        nearness);
 }
 
+/* A bit for each box whose image is at most two tiles wide and high. */
+UMB_INLINE uint32_t small_images(const umb_projected *b)
+{
+    uint32_t bits = 0;
+    for (int i = 0; i < UMB_NODE_WIDTH; i += UMB_LANES) {
+        umb_iv wide = (umb_iv_load(b->x1 + i) >> 5) - (umb_iv_load(b->x0 + i) >> 5);
+        umb_iv high = (umb_iv_load(b->y1 + i) >> 3) - (umb_iv_load(b->y0 + i) >> 3);
+        bits |= umb_iv_bits((wide | high) <= 1) << i;
+    }
+    return bits;
+}
+
+UMB_INLINE tile_rect tiles_of(const umb_projected *b, uint32_t i)
+{
+    return find_tiles((uint32_t)b->x0[i], (uint32_t)b->y0[i], (uint32_t)b->x1[i], (uint32_t)b->y1[i]);
+}
+
+/* First the small ones, then the large ones: which comes when cannot be guessed. */
 static uint32_t hides(const umb_coverage *c, const umb_projected *b, uint32_t mask)
 {
-    uint32_t hidden = 0;
-    for (uint32_t left = mask; left != 0; left &= left - 1) {
+    uint32_t hidden = 0, small = small_images(b);
+    for (uint32_t left = mask & small; left != 0; left &= left - 1) {
         uint32_t i = (uint32_t)__builtin_ctz(left);
-        if (rect_hidden(c, (uint32_t)b->x0[i], (uint32_t)b->y0[i], (uint32_t)b->x1[i], (uint32_t)b->y1[i],
-                        b->nearness[i])) {
-            hidden |= 1u << i;
-        }
+        tile_rect t = tiles_of(b, i);
+        hidden |= (uint32_t)small_hidden(c, &t, b->nearness[i]) << i;
+    }
+    for (uint32_t left = mask & ~small; left != 0; left &= left - 1) {
+        uint32_t i = (uint32_t)__builtin_ctz(left);
+        tile_rect t = tiles_of(b, i);
+        hidden |= (uint32_t)large_hidden(c, &t, b->nearness[i]) << i;
     }
     return hidden;
 }
@@ -201,45 +222,70 @@ static inline bool merge_parts(umb_coverage *c, size_t number, const tile_part p
 
 /* ---- vertices ------------------------------------------------------------------------------- */
 
-/* World vertices relative to the eye, component by component; the last one again up to a whole vector. */
-static void approach(umb_silhouette *s, const umb_raster_map *map, const umb_occluder *o)
+/* Several vertices of a mesh from v on, axis by axis; the last one again where there are no more. */
+typedef struct some_points {
+    umb_dv at[3];
+} some_points;
+
+UMB_INLINE some_points load_points(const umb_mesh *mesh, uint32_t v)
 {
-    const umb_mesh *mesh = o->mesh;
-    uint32_t count = mesh->block_position_count;
-    for (uint32_t v = 0; v < count; ++v) {
-        const float *p = mesh->positions[v];
-        float world[3];
-        if (!o->identity) {
-            umb_transform_point(&o->transform, p, world);
-            p = world;
-        }
-        s->d[0][v] = p[0] - map->eye.x;
-        s->d[1][v] = p[1] - map->eye.y;
-        s->d[2][v] = p[2] - map->eye.z;
+    typedef float few __attribute__((vector_size(4 * UMB_WIDE)));
+    const float *p[UMB_WIDE];
+    uint32_t last = mesh->block_position_count - 1;
+    for (uint32_t i = 0; i < UMB_WIDE; ++i) {
+        p[i] = mesh->positions[v + i < last ? v + i : last];
     }
-    s->vertex_count = count;
-    s->padded_count = (count + UMB_WIDE - 1) & ~(uint32_t)(UMB_WIDE - 1);
-    for (uint32_t v = count; v < s->padded_count; ++v) {
-        for (int axis = 0; axis < 3; ++axis) {
-            s->d[axis][v] = s->d[axis][count - 1];
-        }
+    some_points out;
+    for (int axis = 0; axis < 3; ++axis) {
+#if UMB_WIDE == 4
+        few c = {p[0][axis], p[1][axis], p[2][axis], p[3][axis]};
+#else
+        few c = {p[0][axis], p[1][axis]};
+#endif
+        out.at[axis] = __builtin_convertvector(c, umb_dv);
     }
+    return out;
 }
 
-/* The cut is placed 64 units of the mesh's reach beyond near_cut: then what is kept, rounding included, is
- * truly beyond it, and W is large enough for the bounds of a division. */
-static void find_cut(umb_silhouette *s, const umb_raster_map *m)
+/* umb_transform_point(), several at once. */
+UMB_INLINE some_points transform_points(const umb_transform *t, some_points p)
 {
-    umb_dv reach = umb_dv_set(0.0), w_min = umb_dv_set(INFINITY), w_max = -w_min;
+    typedef float few __attribute__((vector_size(4 * UMB_WIDE)));
+    some_points out;
+    for (int i = 0; i < 3; ++i) {
+        umb_dv at = (double)t->m[i][0] * p.at[0] + (double)t->m[i][1] * p.at[1] + (double)t->m[i][2] * p.at[2] +
+                    (double)t->m[i][3];
+        out.at[i] = __builtin_convertvector(__builtin_convertvector(at, few), umb_dv);
+    }
+    return out;
+}
+
+/* World vertices relative to the eye, component by component, and W; the last one again up to a whole vector.
+ *
+ * The cut is placed 64 units of the mesh's reach beyond near_cut: then what is kept, rounding included, is
+ * truly beyond it, and W is large enough for the bounds of a division. */
+static void approach(umb_silhouette *s, const umb_raster_map *m, const umb_occluder *o)
+{
+    uint32_t count = o->mesh->block_position_count;
+    umb_dv most = umb_dv_set(0.0), w_min = umb_dv_set(INFINITY), w_max = -w_min;
+    s->vertex_count = count;
+    s->padded_count = (count + UMB_WIDE - 1) & ~(uint32_t)(UMB_WIDE - 1);
     for (uint32_t v = 0; v < s->padded_count; v += UMB_WIDE) {
-        umb_dv dx = umb_dv_load(s->d[0] + v), dy = umb_dv_load(s->d[1] + v), dz = umb_dv_load(s->d[2] + v);
+        some_points p = load_points(o->mesh, v);
+        if (!o->identity) {
+            p = transform_points(&o->transform, p);
+        }
+        umb_dv dx = p.at[0] - m->eye.x, dy = p.at[1] - m->eye.y, dz = p.at[2] - m->eye.z;
         umb_dv w = (m->w.x * dx + m->w.y * dy) + m->w.z * dz;
+        umb_dv_store(s->d[0] + v, dx);
+        umb_dv_store(s->d[1] + v, dy);
+        umb_dv_store(s->d[2] + v, dz);
         umb_dv_store(s->w + v, w);
-        reach = umb_dv_max(reach, (umb_dv_abs(dx) + umb_dv_abs(dy)) + umb_dv_abs(dz));
+        most = umb_dv_max(most, (umb_dv_abs(dx) + umb_dv_abs(dy)) + umb_dv_abs(dz));
         w_min = umb_dv_min(w_min, w);
         w_max = umb_dv_max(w_max, w);
     }
-    s->reach = -umb_dv_least(-reach);
+    s->reach = -umb_dv_least(-most);
     s->cut_depth = m->near_cut + 64.0 * UMB_U * (s->reach + fabs(m->near_cut));
     s->cut = umb_dv_least(w_min) < s->cut_depth;
     s->any = -umb_dv_least(-w_max) >= s->cut_depth;
@@ -247,10 +293,8 @@ static void find_cut(umb_silhouette *s, const umb_raster_map *m)
 
 /* Bounds of section 3, for several vertices at once. What is cut away is left out of extremes by making it a copy
  * of the cut depth in its own direction: no infinity arises, and nobody looks at it. */
-static void place(umb_silhouette *s, const umb_raster_map *m, const umb_occluder *o)
+static void place(umb_silhouette *s, const umb_raster_map *m)
 {
-    approach(s, m, o);
-    find_cut(s, m);
     if (!s->any) {
         return;
     }
@@ -309,6 +353,53 @@ static void place(umb_silhouette *s, const umb_raster_map *m, const umb_occluder
     s->y_min = umb_dv_least(y_min);
     s->x_max = -umb_dv_least(-x_max);
     s->y_max = -umb_dv_least(-y_max);
+}
+
+/* place() without bounds of errors, then the pixel of each vertex, as open_at() in raster.c finds it. */
+static bool shows_corner(const umb_coverage *c, umb_silhouette *s, const umb_raster_map *m)
+{
+    if (s->cut) {
+        return true;
+    }
+    umb_dv zero = umb_dv_set(0.0), width = umb_dv_set(m->width), height = umb_dv_set(m->height);
+    umb_dv span = umb_dv_set(m->rows.span);
+    for (uint32_t v = 0; v < s->padded_count; v += UMB_WIDE) {
+        umb_dv dx = umb_dv_load(s->d[0] + v), dy = umb_dv_load(s->d[1] + v), dz = umb_dv_load(s->d[2] + v);
+        umb_dv reach = (umb_dv_abs(dx) + umb_dv_abs(dy)) + umb_dv_abs(dz);
+        umb_dv w = umb_dv_load(s->w + v), off = (5.0 * UMB_U) * reach;
+        umb_dv x = (m->x.x * dx + m->x.y * dy) + m->x.z * dz;
+        umb_dv y = (m->y.x * dx + m->y.y * dy) + m->y.z * dz;
+        umb_dv near_least;
+        if (m->orthographic) {
+            near_least = -(w + off);
+            near_least -= (4.0 * UMB_U) * umb_dv_abs(near_least);
+        } else {
+            umb_dv r = 1.0 / w;
+            x *= r;
+            y *= r;
+            near_least = r - r * (2.0 * off * r + 4.0 * UMB_U);
+        }
+        x += m->cx;
+        y += m->cy;
+        umb_dv into = umb_dv_min(umb_dv_max(y - m->rows.from, zero), span);
+        umb_dv row = umb_dv_max(m->rows.slope * y + m->rows.extra * into, zero);
+        umb_lv on = (x >= zero) & (x < width) & (y >= zero) & (y < height);
+        umb_dv_store(s->x + v, umb_dv_select(on, x, umb_dv_set(-1.0))); /* beside the raster */
+        umb_dv_store(s->y + v, umb_dv_min(row, height - 1.0));
+        umb_dv_store(s->near_least + v, near_least);
+    }
+    for (uint32_t v = 0; v < s->vertex_count; ++v) {
+        if (s->x[v] < 0.0) {
+            continue;
+        }
+        uint32_t column = (uint32_t)(int32_t)s->x[v], row = (uint32_t)(int32_t)s->y[v];
+        const umb_tile *t = &c->tiles[(size_t)(row / UMB_TILE_HEIGHT) * c->columns + column / UMB_TILE_WIDTH];
+        uint32_t r = row % UMB_TILE_HEIGHT, bit = column % UMB_TILE_WIDTH;
+        if ((t->mask[r] >> bit & 1u) == 0 || t->z[4 * (r / 4) + bit / 8] < s->near_least[v]) {
+            return true;
+        }
+    }
+    return false;
 }
 
 /* ---- convex shapes: set-up ------------------------------------------------------------------ */
@@ -1160,5 +1251,5 @@ static uint32_t merge_list(umb_coverage *c, const umb_tile_list *list)
     return changed;
 }
 
-const umb_raster_kernels KERNELS = {ISA,      hides,       hides_rect,   place,     find_convex, find_box,
-                                    fill_convex, hides_convex, fill_mesh, list_mesh,   merge_list};
+const umb_raster_kernels KERNELS = {ISA,      hides,       hides_rect,   approach,  shows_corner, place,     find_convex,
+                                    find_box, fill_convex, hides_convex, fill_mesh, list_mesh,    merge_list};
