@@ -4,6 +4,7 @@
 #include <string.h>
 
 #define LEAST_PART 0x1p-19
+#define TRIALS 96
 
 static void corners_of(const umb_beam_part *p, double out[8][3])
 {
@@ -151,9 +152,46 @@ static __attribute__((noinline)) verdict look_at(const umb_solids *solids, const
     return look(&l, kept, *n);
 }
 
+/* A point of a part: six numbers in [-1, 1) make a segment. */
+static void point_of(const umb_beam_part *p, const double share[3], double out[3])
+{
+    for (int k = 0; k < 3; ++k) {
+        out[k] = p->middle[k] + share[0] * p->axes[0][k] + share[1] * p->axes[1][k] + share[2] * p->axes[2][k];
+    }
+}
+
+/* Some segments of the beam, spread evenly (multiples of the powers of 1/x with x^7 = x + 1): false if no body meets one of
+ * them. What shows in the middle of a part would be found late by cutting. */
+static bool trials_blocked(const umb_solids *solids, const umb_beam_part *a, const umb_beam_part *b, const uint32_t *bodies,
+                           uint32_t count)
+{
+    static const double steps[6] = {0.89865371264453, 0.80757849521866, 0.72573341300846,
+                                    0.65218302601174, 0.58608669787303, 0.52668898694889};
+    uint32_t last = 0;
+    for (int n = 1; n <= TRIALS; ++n) {
+        double share[2][3], from[3], to[3];
+        for (int k = 0; k < 6; ++k) {
+            double x = n * steps[k];
+            share[k / 3][k % 3] = 2.0 * (x - floor(x)) - 1.0;
+        }
+        point_of(a, share[0], from);
+        point_of(b, share[1], to);
+        uint32_t i = 0;
+        while (i < count && !umb_solid_meets(solids, &solids->items[bodies[(last + i) % count]], from, to)) {
+            ++i;
+        }
+        if (i == count) {
+            return false;
+        }
+        last = (last + i) % count;
+    }
+    return true;
+}
+
 /* Whatever of the segments between corners no body meets will still be there in some part, however small: then it is no
  * use to go on. */
-bool umb_beam_blocked(umb_beam_search *s, const umb_beam_part *a, const umb_beam_part *b, const uint32_t *bodies, uint32_t count)
+static bool blocked(umb_beam_search *s, const umb_beam_part *a, const umb_beam_part *b, const uint32_t *bodies, uint32_t count,
+                    bool whole)
 {
     uint32_t kept[UMB_BEAM_BODIES], n;
     if (s->effort == 0) {
@@ -161,7 +199,7 @@ bool umb_beam_blocked(umb_beam_search *s, const umb_beam_part *a, const umb_beam
     }
     s->effort -= 1;
     verdict v = look_at(s->solids, a, b, bodies, count, kept, &n);
-    if (v != SHARED) {
+    if (v != SHARED || (whole && !trials_blocked(s->solids, a, b, kept, n))) {
         return v == BLOCKED;
     }
     double la, lb, least = LEAST_PART * s->solids->reach;
@@ -171,9 +209,14 @@ bool umb_beam_blocked(umb_beam_search *s, const umb_beam_part *a, const umb_beam
     }
     for (int side = -1; side <= 1; side += 2) {
         umb_beam_part half = la > lb ? half_of(a, axis_a, side) : half_of(b, axis_b, side);
-        if (!umb_beam_blocked(s, la > lb ? &half : a, la > lb ? b : &half, kept, n)) {
+        if (!blocked(s, la > lb ? &half : a, la > lb ? b : &half, kept, n, false)) {
             return false;
         }
     }
     return true;
+}
+
+bool umb_beam_blocked(umb_beam_search *s, const umb_beam_part *a, const umb_beam_part *b, const uint32_t *bodies, uint32_t count)
+{
+    return blocked(s, a, b, bodies, count, true);
 }

@@ -100,7 +100,7 @@ static umb_beam_part part_of_triangle(const double p[3][3], double more)
     return best;
 }
 
-static uint8_t decide_part(const refinement *f, const umb_beam_part *target)
+static uint8_t decide_part(const refinement *f, const umb_beam_part *target, uint32_t *effort)
 {
     const umb_solids *solids = &f->region->solids;
     uint32_t bodies[UMB_BEAM_BODIES];
@@ -111,8 +111,9 @@ static uint8_t decide_part(const refinement *f, const umb_beam_part *target)
     umb_beam_bounds(target, min[1], max[1]);
     umb_shaft_make(&shaft, (const double(*)[3])min, (const double(*)[3])max);
     uint32_t count = umb_solid_tree_find(&f->region->solid_tree, solids, &shaft, UMB_BEAM_BODIES, bodies);
-    umb_beam_search s = {solids, f->effort};
+    umb_beam_search s = {solids, *effort};
     bool hidden = umb_beam_blocked(&s, &f->cell, target, bodies, count);
+    *effort = s.effort;
     return hidden ? HIDDEN : s.effort == 0 ? UNDECIDED : STAYS;
 }
 
@@ -120,6 +121,7 @@ static uint8_t decide_part(const refinement *f, const umb_beam_part *target)
 static uint8_t decide_triangles(const refinement *f, const umb_object *o)
 {
     const umb_mesh *m = o->mesh;
+    uint32_t effort = f->effort + m->seen_count;
     for (uint32_t t = 0; t < m->seen_count; ++t) {
         double p[3][3];
         for (int c = 0; c < 3; ++c) {
@@ -134,7 +136,7 @@ static uint8_t decide_triangles(const refinement *f, const umb_object *o)
             }
         }
         umb_beam_part target = part_of_triangle((const double(*)[3])p, UMB_BEAM_MARGIN * f->region->reach);
-        uint8_t state = decide_part(f, &target);
+        uint8_t state = decide_part(f, &target, &effort);
         if (state != HIDDEN) {
             return state;
         }
@@ -145,7 +147,8 @@ static uint8_t decide_triangles(const refinement *f, const umb_object *o)
 static uint8_t decide(const refinement *f, const umb_object *o)
 {
     umb_beam_part target = part_of_object(o, f->region->reach);
-    uint8_t state = decide_part(f, &target);
+    uint32_t effort = f->effort;
+    uint8_t state = decide_part(f, &target, &effort);
     bool by_triangles = o->refine && o->mesh->seen_count <= MOST_TRIANGLES && (state == UNDECIDED || !o->mesh->box);
     return state != HIDDEN && by_triangles ? decide_triangles(f, o) : state;
 }

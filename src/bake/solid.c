@@ -171,6 +171,16 @@ static void cut(stretch *s, double va, const double vb[8])
     }
 }
 
+/* The same where all of a lies on one side and all of b on the other, as it mostly is. */
+static void cut_all(double *bound, bool enters, double va, const double vb[8])
+{
+    for (int j = 0; j < 8; ++j) {
+        double at = va / (va - vb[j]);
+        bool better = enters ? at > bound[j] : at < bound[j];
+        bound[j] = better ? at : bound[j];
+    }
+}
+
 uint64_t umb_solid_blocks(const umb_solids *s, const umb_solid *body, const double a[8][3], const double b[8][3])
 {
     const double(*planes)[4] = (const double(*)[4])s->planes + body->first_plane;
@@ -193,8 +203,13 @@ uint64_t umb_solid_blocks(const umb_solids *s, const umb_solid *body, const doub
         if (a_out == 8 && b_out == 8) {
             return 0;
         }
+        bool enters = a_out == 8 && b_out == 0, leaves = a_out == 0 && b_out == 8;
         for (int i = 0; i < 8 && a_out + b_out > 0; ++i) {
-            cut(&stretches[i], va[i], vb);
+            if (enters || leaves) {
+                cut_all(enters ? stretches[i].from : stretches[i].to, enters, va[i], vb);
+            } else {
+                cut(&stretches[i], va[i], vb);
+            }
         }
     }
     uint64_t blocked = 0;
