@@ -226,7 +226,7 @@ static bool run_part(soak_state *st, const soak_part *part, soak_count *count, u
         return false;
     }
     bool ok = true;
-    if (!all_done(&log) && !stop) {
+    if (!all_done(&log) && !stop && st->s->most_batches > 0) {
         if (!same_scene(&st->scene, part)) {
             (void)fprintf(stderr, "%s: loading %s\n", part->name, part->scene);
             soak_scene_free(&st->scene);

@@ -62,6 +62,8 @@ typedef struct region_hunt {
     uint8_t *candidate;                                        /* per object */
     uint32_t *targets;                                         /* likely ones first */
     uint32_t target_count, likely_count;
+    uint32_t *hidden; /* accused objects that nothing was seen of, those right behind what is seen first */
+    uint32_t hidden_count, near_hidden;
     uint64_t phase, round, cast, budget;
     region_hand *hands;
     uint64_t first_item, item_count, items_per_task; /* of the running block */
@@ -87,6 +89,12 @@ void region_spread_item(region_hand *hand, uint64_t item);
 void region_border_item(region_hand *hand, uint64_t item);
 /* At objects that are not seen, and at triangles that are not seen of objects that are. */
 void region_target_item(region_hand *hand, uint64_t item);
+
+/* Many rays from one eye at one hidden object (region_volley.c). */
+#define REGION_VOLLEY 64u
+void region_volley_item(region_hand *hand, uint64_t item);
+/* Who is hidden, as known now. False when memory is short. */
+bool region_volley_prepare(region_hunt *h);
 
 /* A point of the cell: `random` chooses among its corners, edges, faces and, where something lies
  * in it, its inside. */

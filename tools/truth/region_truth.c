@@ -105,6 +105,7 @@ static void destroy(region_hunt *h)
     free(h->leak_of);
     free(h->candidate);
     free(h->targets);
+    free(h->hidden);
     free(h->pending);
 }
 
@@ -200,6 +201,23 @@ static void rounds(region_hunt *h, region_result *out)
     out->budget_spent = true;
 }
 
+/* In pieces: what is found is not aimed at again. */
+static void volleys(region_hunt *h)
+{
+    uint64_t end = h->cast + h->options->volleys, next = 0;
+    for (int piece = 8; piece > 0 && !h->failed && h->cast < end; --piece) {
+        if (!region_volley_prepare(h)) {
+            h->failed = true;
+        }
+        if (h->failed || h->hidden_count == 0) {
+            return;
+        }
+        h->budget = end;
+        uint64_t rays = (end - h->cast + (uint64_t)piece - 1) / (uint64_t)piece;
+        next += region_phase(h, region_volley_item, next, rays / REGION_VOLLEY + 1, REGION_VOLLEY, rays);
+    }
+}
+
 /* Accused objects that only rays of floats saw: decide them exactly. */
 static bool decide(region_hunt *h, region_result *out)
 {
@@ -293,6 +311,7 @@ bool region_search(truth *t, const region_cell *cell, const region_options *opti
     ok = ok && make(&h, &view);
     if (ok) {
         rounds(&h, out);
+        volleys(&h);
         ok = !h.failed && fill(&h, out);
     }
     destroy(&h);

@@ -29,6 +29,7 @@ typedef struct region_witness {
 
 typedef struct region_options {
     uint64_t rays; /* budget; 0: 4 million */
+    uint64_t volleys; /* so many more, of a cheap kind, at what is accused alone */
     uint64_t seed;
     bool exhaust; /* spend all of it, even where nothing new appears */
     /* Per object, each may be NULL: 1 if a method hid it; 1 if it reported it without being sure.
@@ -59,7 +60,7 @@ typedef struct region_result {
     uint32_t wrong;
     uint32_t unconfirmed; /* accused objects with an unconfirmed one only */
     uint32_t withdrawn;   /* accused objects whose lines exact arithmetic proved not to be free */
-    uint64_t rays;
+    uint64_t rays; /* volleys too */
     uint32_t rounds;
     region_progress progress[REGION_ROUNDS];
     bool budget_spent; /* stopped by the budget, not because nothing new appeared */
