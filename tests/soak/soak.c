@@ -1,11 +1,11 @@
 /* soak: zero wrongly hidden, over many views.
  *
- *   soak [--short] [--out FOLDER] [--threads N] [--scale X] [--only TEXT] [--views N]
+ *   soak [--short] [--out FOLDER] [--threads N] [--scale X] [--only TEXT] [--views N] [--rays N]
  *        [--plant 1|2] [--part NAME --view K]
  *
  * Prints the tables of docs/results/soak.md: views, then view cells. What is done is kept in FOLDER (out/soak), a file for
  * each part of the plan, and taken up by the next run of the same program over the same scenes.
- * --only: parts whose name or family contains TEXT. --views: of each part no more than N new ones.
+ * --only: parts whose name or family contains TEXT. --views: of each part no more than N new ones. --rays: of each view cell.
  * --plant: cull a scene with a planted mistake (1: objects too small, 2: occluders too large),
  * which must be found. --part --view: one view alone, told in full. FOLDER/wrongly-hidden.txt and
  * unconfirmed.txt name objects with their lines.
@@ -30,7 +30,7 @@ typedef struct settings {
     uint32_t threads, most_batches;
     double scale;
     plant planted;
-    uint64_t view;
+    uint64_t view, rays;
 } settings;
 
 static volatile sig_atomic_t stop;
@@ -67,6 +67,8 @@ static bool read_settings(int count, char **words, settings *s)
             s->part = value;
         } else if (strcmp(word, "--view") == 0) {
             s->view = strtoull(value, NULL, 10);
+        } else if (strcmp(word, "--rays") == 0) {
+            s->rays = strtoull(value, NULL, 10);
         } else if (strcmp(word, "--threads") == 0) {
             s->threads = (uint32_t)strtoul(value, NULL, 10);
         } else if (strcmp(word, "--views") == 0) {
@@ -299,6 +301,9 @@ int main(int count, char **words)
     if (!soak_plan_make(s.full, s.scale, &plan, &error)) {
         (void)fprintf(stderr, "soak: %s\n", error.text);
         return INPUT;
+    }
+    for (uint32_t k = 0; s.rays != 0 && k < plan.count; ++k) {
+        plan.parts[k].rays = of_cells(&plan.parts[k]) ? s.rays : plan.parts[k].rays;
     }
     int code = run_plan(&s, &plan, words[0]);
     soak_plan_free(&plan);
