@@ -2,7 +2,7 @@
  * the commit (scene and index) and for the cull after it, beside an index that is built anew each frame; objects that
  * come and go; how long single commits take; and what a frame costs in ever larger scenes of which the same number of objects is visible.
  *
- *     bench_updates [most objects] [seconds for each figure] [index] [motion|changes|commits|scaling]
+ *     bench_updates [most objects] [seconds for each figure] [index] [motion|changes|commits|layers|scaling]
  *
  * Lines of comma-separated values; scripts/updates-report makes docs/results/updates.md of them. Ratios are within one
  * run, times the processor's, of this thread.
@@ -335,6 +335,68 @@ static void bench_all_commits(uint32_t most, double seconds)
     }
 }
 
+/* ---- layers ------------------------------------------------------------------------------------- */
+
+/* The least time of some frames that look all about. */
+static double cull_time(const swarm *s, umb_index *index, umb_method method, uint32_t mask, uint32_t *count)
+{
+    umb_culler_def def = {.method = method};
+    umb_culler *culler;
+    double best = 1e30;
+    must(umb_culler_create(index, &def, &culler));
+    for (int round = 0; round < 20; ++round) {
+        swarm at = *s;
+        double start = now();
+        *count = 0;
+        for (at.step = 0; at.step < 32; ++at.step) {
+            umb_view v = view_of(&at);
+            umb_visible_set seen;
+            v.mask = mask;
+            must(umb_cull(culler, &v, &seen));
+            *count += seen.count;
+        }
+        best = now() - start < best ? now() - start : best;
+    }
+    umb_culler_destroy(culler);
+    return 1e3 * best / 32;
+}
+
+/* One of four layers asked for; nearby is what lies on one side of the world in x and y, or every fourth object. */
+static void bench_layers(uint32_t count, bool nearby)
+{
+    swarm s = {0};
+    umb_index *index;
+    random_state = 88172645463325252u;
+    swarm_make(&s, count, false);
+    must(umb_index_create(s.scene, NULL, &index));
+    for (uint32_t i = 0; i < count; ++i) {
+        uint32_t cell = nearby ? (s.at[i][0] < s.side / 2 ? 0u : 1u) + (s.at[i][1] < s.side / 2 ? 0u : 2u) : i % 4;
+        must(umb_scene_mask_object(s.scene, i, 1u << cell));
+    }
+    double start = now();
+    must(umb_scene_commit(s.scene));
+    double commit = 1e3 * (now() - start);
+    static const umb_method methods[2] = {UMB_METHOD_NONE, UMB_METHOD_RASTER};
+    for (int m = 0; m < 2; ++m) {
+        uint32_t all, some;
+        double whole = cull_time(&s, index, methods[m], 0, &all), layer = cull_time(&s, index, methods[m], 2, &some);
+        printf("layers,%u,%s,%s,%.4f,%.4f,%.1f,%.1f,%.3f\n", count, nearby ? "apart" : "mixed", umb_method_name(methods[m]), whole,
+               layer, all / 32.0, some / 32.0, commit);
+        fflush(stdout);
+    }
+    umb_index_destroy(index);
+    swarm_free(&s);
+}
+
+static void bench_all_layers(uint32_t most)
+{
+    printf("layers,objects,layers_lie,method,all_ms,one_ms,all_reported,one_reported,commit_ms\n");
+    for (uint32_t count = 1000; count <= most && count <= 100000; count *= 10) {
+        bench_layers(count, true);
+        bench_layers(count, false);
+    }
+}
+
 /* ---- output sensitivity ------------------------------------------------------------------------- */
 
 /* A wall, two hundred things in front of it, and ever more behind it, in a hall that grows with them; one in ten of
@@ -481,10 +543,11 @@ int main(int argc, char **argv)
     umb_index_def def = {0};
     bool all = part[0] == '\0', motion = all || strcmp(part, "motion") == 0, changes = all || strcmp(part, "changes") == 0;
     bool commits = all || strcmp(part, "commits") == 0, scaling = all || strcmp(part, "scaling") == 0;
+    bool layers = all || strcmp(part, "layers") == 0;
     if (most < 1000 || !(seconds > 0.0) || (argc > 3 && !umb_index_parse(argv[3], &def)) ||
-        !(motion || changes || commits || scaling)) {
+        !(motion || changes || commits || layers || scaling)) {
         fprintf(stderr, "usage: bench_updates [most objects, from 1000] [seconds for each figure] [index] "
-                        "[motion|changes|commits|scaling]\n");
+                        "[motion|changes|commits|layers|scaling]\n");
         return 2;
     }
     if (motion) {
@@ -495,6 +558,9 @@ int main(int argc, char **argv)
     }
     if (commits) {
         bench_all_commits(most, seconds);
+    }
+    if (layers) {
+        bench_all_layers(most);
     }
     if (scaling) {
         printf("scaling,behind,visible,still_cull_ms,moving_cull_ms,moving_commit_ms\n");

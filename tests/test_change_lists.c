@@ -16,6 +16,8 @@ enum { MOST = 400, MOST_OCCLUDERS = 2000 };
 
 static const float corners[4][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
 static const uint32_t faces[4][3] = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
+static const umb_shape_def small =
+    {.positions = corners[0], .position_count = 4, .indices = faces[0], .index_count = 9};
 static const umb_shape_def solid = {
     .positions = corners[0], .position_count = 4, .indices = faces[0], .index_count = 12};
 
@@ -113,7 +115,8 @@ static void compare(const reader *r, const umb_committed *c)
 
 static void edit(umb_scene *scene, dice *d, umb_shape shape)
 {
-    uint32_t id = dice_roll(d, MOST), unused, what = dice_roll(d, 16);
+    static const umb_aabb box = {{0, 0, 0}, {1, 1, 1}};
+    uint32_t id = dice_roll(d, MOST), unused, what = dice_roll(d, 18);
     umb_transform t = random_place(d);
     umb_object_def def = {.shape = shape, .transform = t, .flags = dice_roll(d, 16)};
     if (what < 5) {
@@ -124,6 +127,8 @@ static void edit(umb_scene *scene, dice *d, umb_shape shape)
         (void)umb_scene_remove_object(scene, id);
     } else if (what < 12) {
         (void)umb_scene_flag_object(scene, id, def.flags);
+    } else if (what >= 16) { /* another shape, or none: the shape's number is 1, the small one's 2 */
+        (void)umb_scene_shape_object(scene, id, dice_roll(d, 3), &box);
     } else if (what == 12) {
         assert_int_equal(umb_scene_add_occluder(scene, shape, &t, &unused), UMB_OK);
     } else if (what < 15) {
@@ -143,6 +148,9 @@ static void test_lists_tell_all(void **state)
     umb_shape shape;
     assert_int_equal(umb_scene_create(NULL, &scene), UMB_OK);
     assert_int_equal(umb_scene_add_shape(scene, &solid, &shape), UMB_OK);
+    umb_shape other;
+    assert_int_equal(umb_scene_add_shape(scene, &small, &other), UMB_OK);
+    assert_true(shape == 1 && other == 2);
     const umb_committed *c = umb_scene_committed(scene);
     for (int round = 0; round < 4000; ++round) {
         for (uint32_t i = dice_roll(&d, 12); i > 0; --i) {

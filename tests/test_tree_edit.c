@@ -71,6 +71,7 @@ static walked check_node(const grove *g, const umb_committed *c, uint32_t number
             umb_aabb below = umb_node_bounds(&e->nodes[of]);
             assert_true(same_box(node, slot, &below));
             walked w = check_node(g, c, of, 2);
+            assert_true((e->nodes[of].layers & ~node->layers) == 0);
             sum.nodes += w.nodes;
             sum.items += w.items;
             sum.depth = w.depth + 1 > sum.depth ? w.depth + 1 : sum.depth;
@@ -79,6 +80,7 @@ static walked check_node(const grove *g, const umb_committed *c, uint32_t number
             assert_true(object ? c->objects[of].live : of >= c->first_free_occluder && of < c->occluder_count);
             assert_true(same_box(node, slot, object ? &c->objects[of].bounds : &c->occluders[of].bounds));
             assert_int_equal(umb_tree_edit_place(e, ref), number * UMB_NODE_WIDTH + slot);
+            assert_true((umb_layers_of(object ? c->objects[of].mask : c->occluder_masks[of]) & ~node->layers) == 0);
             sum.items += 1;
         }
     }
@@ -218,7 +220,7 @@ static void add(grove *g)
 
 static void edit(grove *g)
 {
-    uint32_t id = random_below(&g->seed, umb_scene_object_count(g->scene) + 1), what = random_below(&g->seed, 12);
+    uint32_t id = random_below(&g->seed, umb_scene_object_count(g->scene) + 1), what = random_below(&g->seed, 14);
     umb_aabb box = some_box(g);
     umb_transform t = {{{1, 0, 0, box.min[0]}, {0, 1, 0, 1}, {0, 0, 1, 2}}};
     uint32_t unused;
@@ -230,6 +232,8 @@ static void edit(grove *g)
         (void)umb_scene_remove_object(g->scene, id);
     } else if (what == 9) {
         (void)umb_scene_flag_object(g->scene, id, random_below(&g->seed, 2) != 0 ? UMB_OBJECT_IGNORED : 0);
+    } else if (what > 11) {
+        (void)umb_scene_mask_object(g->scene, id, random_below(&g->seed, 4));
     } else if (what == 10) {
         (void)umb_scene_add_occluder(g->scene, g->shape, &t, &unused);
     } else {

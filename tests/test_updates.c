@@ -44,7 +44,7 @@ typedef struct follower {
 typedef struct thing {
     umb_transform at;
     uint32_t mesh; /* MODEL_NONE: bounds alone */
-    uint32_t flags;
+    uint32_t flags, mask;
     bool used;
 } thing;
 
@@ -55,6 +55,7 @@ typedef struct world {
     follower all[MOST_INDICES];
     uint32_t count, used, occluders;
     uint64_t seed;
+    bool layered;
 } world;
 
 static const uint32_t BOX[36] = {0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5, 0, 1, 5, 0, 5, 4,
@@ -137,12 +138,18 @@ static umb_aabb some_box(world *w)
     return random_below(&w->seed, 30) == 0 ? absurd_box(&w->seed) : random_box(&w->seed, origin, REACH / 2.0);
 }
 
+/* Layers of three; things are in none for a while, then some are in all. */
+static uint32_t some_mask(world *w)
+{
+    return w->layered ? random_below(&w->seed, 8) : 0;
+}
+
 static void add(world *w)
 {
     static const uint32_t all_flags[4] = {0, UMB_OBJECT_IS_SHAPE, UMB_OBJECT_NEVER_HIDES, 0};
     uint32_t mesh = random_below(&w->seed, 5), id;
-    thing t = {some_place(w), mesh < 3 ? mesh : MODEL_NONE, all_flags[random_below(&w->seed, 4)], true};
-    umb_object_def def = {.transform = t.at, .flags = t.flags};
+    thing t = {some_place(w), mesh < 3 ? mesh : MODEL_NONE, all_flags[random_below(&w->seed, 4)], some_mask(w), true};
+    umb_object_def def = {.transform = t.at, .flags = t.flags, .mask = t.mask};
     if (t.mesh == MODEL_NONE) {
         def.bounds = some_box(w);
         def.flags = t.flags = 0;
@@ -174,9 +181,20 @@ static void move(world *w, uint32_t id)
     assert_int_equal(umb_scene_move_object(w->scene, id, &to, t->mesh == MODEL_NONE ? &box : NULL), UMB_OK);
 }
 
+/* Another shape, or none, where it is. */
+static void reshape(world *w, uint32_t id)
+{
+    thing *t = &w->things[id];
+    uint32_t mesh = random_below(&w->seed, 4);
+    umb_aabb box = some_box(w);
+    t->mesh = mesh < 3 ? mesh : MODEL_NONE;
+    umb_shape shape = mesh < 3 ? w->shapes[mesh] : 0;
+    assert_int_equal(umb_scene_shape_object(w->scene, id, shape, mesh < 3 ? NULL : &box), UMB_OK);
+}
+
 static void edit(world *w)
 {
-    uint32_t id = random_below(&w->seed, MOST), what = random_below(&w->seed, 20), number;
+    uint32_t id = random_below(&w->seed, MOST), what = random_below(&w->seed, 24), number;
     thing *t = &w->things[id];
     if (w->used < LEAST || (what < 3 && w->used < MOST - 20)) {
         add(w);
@@ -189,6 +207,11 @@ static void edit(world *w)
         assert_int_equal(umb_scene_flag_object(w->scene, id, t->flags), UMB_OK);
     } else if (what < 18 && t->used) {
         move(w, id);
+    } else if (what >= 20 && what < 22 && t->used) {
+        reshape(w, id);
+    } else if (what >= 22 && t->used) {
+        t->mask = some_mask(w);
+        assert_int_equal(umb_scene_mask_object(w->scene, id, t->mask), UMB_OK);
     } else if (what == 18) { /* hand-made occluders are nothing that the oracle sees: inside of what is there, or not at all */
         (void)umb_scene_remove_occluder(w->scene, random_below(&w->seed, 30));
     } else if (what == 19 && w->occluders < 4000) {
@@ -243,8 +266,15 @@ static void check_frustum(const follower *f, const umb_view *v, const uint8_t fo
 
 /* ---- occlusion ---------------------------------------------------------------------------------- */
 
+/* Leave out what is in none of a view's layers. */
+static bool takes(const umb_view *v, uint32_t mask)
+{
+    uint32_t common = mask & v->mask;
+    return v->mask == 0 || mask == 0 || (v->mask_all ? common == v->mask : common != 0);
+}
+
 /* The same things for the oracle. What has bounds alone hides nothing and is nothing that it sees. */
-static model *model_of(const world *w)
+static model *model_of(const world *w, const umb_view *v)
 {
     model *m = model_create();
     uint8_t flags[12] = {0};
@@ -260,7 +290,7 @@ static model *model_of(const world *w)
     }
     for (uint32_t i = 0; i < MOST; ++i) {
         const thing *t = &w->things[i];
-        bool there = t->used && (t->flags & UMB_OBJECT_IGNORED) == 0;
+        bool there = t->used && (t->flags & UMB_OBJECT_IGNORED) == 0 && takes(v, t->mask);
         assert_int_equal(model_add_object(m, "thing", there ? t->mesh : MODEL_NONE, &t->at), i);
     }
     assert_true(model_finish(m, NULL, &error));
@@ -285,7 +315,7 @@ static umb_view look(world *w)
 }
 
 /* Returns how many objects the first index hides. */
-static uint32_t check_occlusion(world *w, uint32_t rays)
+static uint32_t check_occlusion(world *w, uint32_t rays, uint32_t mask)
 {
     static strict_answer answers[MOST_INDICES];
     static strict_count sums[MOST_INDICES];
@@ -293,7 +323,8 @@ static uint32_t check_occlusion(world *w, uint32_t rays)
     umb_view v = look(w);
     umb_visible_set seen;
     umb_error error = {0};
-    model *m = model_of(w);
+    v.mask = mask;
+    model *m = model_of(w, &v);
     truth *t = truth_create(m, &error);
     assert_non_null(t);
     memset(sums, 0, sizeof sums);
@@ -402,8 +433,14 @@ static void test_edits(void **state)
             edit(&w);
         }
         assert_int_equal(umb_scene_commit(w.scene), UMB_OK);
+        w.layered = commits > 100;
         umb_view v = random_view(&w.seed, REACH);
+        v.mask = commits % 2 != 0 ? random_below(&w.seed, 8) : 0;
+        v.mask_all = commits % 4 == 3;
         by_box(w.scene, &v, found);
+        for (uint32_t i = 0; i < MOST; ++i) {
+            found[i] = takes(&v, w.things[i].mask) ? found[i] : 0;
+        }
         for (uint32_t i = 0; i < w.count; ++i) {
             check_frustum(&w.all[i], &v, found);
         }
@@ -411,7 +448,7 @@ static void test_edits(void **state)
             inside += found[i] != 0;
         }
         if (full || commits % 100 == 50) {
-            hidden += check_occlusion(&w, full ? 4000 : 20000);
+            hidden += check_occlusion(&w, full ? 4000 : 20000, oracles % 2 != 0 ? random_below(&w.seed, 8) : 0);
             oracles += 1;
         }
     }

@@ -122,7 +122,7 @@ typedef struct umb_cull_stats {
     uint32_t hidden_movers; /* moving objects that nobody had to ask for */
     uint32_t tests;        /* occluders held against a node's boxes, by methods that choose them first */
     uint32_t left_out;     /* objects not reported because the view's mask or the candidates leave them out, of those that
-                              were met; where an index holds objects in parts, a part may count for itself */
+                              were met: subtrees of an index that are left out as a whole are not; where an index holds objects in parts, a part may count for itself */
 } umb_cull_stats;
 
 /* The answer. Borrowed: valid until the culler's next call. */

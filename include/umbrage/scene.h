@@ -85,6 +85,13 @@ UMB_API umb_result umb_scene_move_object(umb_scene *scene, uint32_t object,
  * become position rounded once, now and after every umb_scene_shift_origin(). */
 UMB_API umb_result umb_scene_place_object(umb_scene *scene, uint32_t object, const umb_transform *transform,
                                           const double position[3], const umb_aabb *bounds);
+/* Give an object another shape where it stands: another level of detail, a wall with a hole where it was shot. bounds NULL: the
+ * shape's own; shape 0: it hides nothing, and bounds must be given. What the object hides is what the new shape hides, from the
+ * next commit on, whose work is that of one change. Objects that move by themselves (motion.h) go on moving, with a volume made
+ * anew for the shape; where that is given by hand it must hold the new shape too, and bounds are not looked at. Dissolves
+ * welds as moving does. The old shape stays the scene's, for other objects. Errors: UMB_ERROR_ARGUMENT for numbers that are not in
+ * use and bounds as in umb_scene_add_object(); nothing has changed then. */
+UMB_API umb_result umb_scene_shape_object(umb_scene *scene, uint32_t object, umb_shape shape, const umb_aabb *bounds);
 /* Replace the UMB_OBJECT_* flags of an object: hide it for a time (IGNORED), or let it hide nothing while it is open
  * (NEVER_HIDES). Dissolves welds as moving does. */
 UMB_API umb_result umb_scene_flag_object(umb_scene *scene, uint32_t object, uint32_t flags);

@@ -75,7 +75,9 @@ static uint32_t in_view(umb_chosen *v, const umb_node *node, const umb_chosen_no
     }
     for (; in != 0; in &= in - 1) {
         uint32_t slot = (uint32_t)__builtin_ctz(in), kind = node->ref[slot] & UMB_REF_KIND;
-        if (kind == UMB_REF_OCCLUDER) {
+        bool node_left_out = kind == UMB_REF_NODE && c->mask.bits != 0 &&
+                             !umb_mask_takes(c->mask, umb_tree_node(c->tree, node->ref[slot] & UMB_REF_NUMBER)->layers);
+        if (kind == UMB_REF_OCCLUDER || node_left_out) {
             continue;
         }
         if (v->once != NULL) {

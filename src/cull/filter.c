@@ -50,6 +50,7 @@ uint32_t umb_filter_present(const umb_filter *f, const umb_node *node, uint32_t 
             present &= umb_mask_takes(f->mask, f->scene->occluder_masks[number]) ? ~0u : ~(1u << slot);
             break;
         default: /* a node */
+            present &= umb_mask_takes(f->mask, umb_tree_node(f->tree, number)->layers) ? ~0u : ~(1u << slot);
             break;
         }
     }

@@ -40,7 +40,8 @@ static inline bool umb_filter_has(const umb_filter *f, uint32_t object)
     return umb_mask_takes(f->mask, f->scene->objects[object].mask);
 }
 
-/* The slots of slots that are nodes, or in the view's layers. Objects that are not are counted. */
+/* The slots of slots that are in the view's layers, or nodes that may hold something in them: subtrees that are left out are so as
+ * a whole. Objects that are left out one by one are counted. */
 uint32_t umb_filter_present(const umb_filter *f, const umb_node *node, uint32_t slots, umb_cull_stats *stats);
 
 /* Take out of what was found what is not to be reported; the rest keeps its order. Return how many are left. */

@@ -5,6 +5,7 @@
 #include "base/memory.h"
 #include "contribution.h"
 #include "found.h"
+#include "scene/mask.h"
 #include "volumes.h"
 
 /* How many nodes ahead of the walk memory is asked for: enough to wait for several at once, few enough for the first
@@ -76,6 +77,13 @@ static void find_part_of_size(umb_in_view *v, uint32_t object)
     }
 }
 
+/* Nothing below a node is in the view's layers. */
+static bool is_left_out(const umb_in_view *v, uint32_t node)
+{
+    umb_mask mask = {v->view->mask, v->view->mask_all};
+    return mask.bits != 0 && !v->view->masked_hide && !umb_mask_takes(mask, umb_tree_node(v->tree, node)->layers);
+}
+
 /* One node or block: what is found is written, nodes below it wait behind the *waiting that do. */
 static void open_node(umb_in_view *v, const umb_node *node, uint16_t planes, uint8_t *remember, uint32_t *waiting)
 {
@@ -94,6 +102,9 @@ static void open_node(umb_in_view *v, const umb_node *node, uint16_t planes, uin
     for (; in != 0; in &= in - 1) {
         uint32_t slot = (uint32_t)__builtin_ctz(in), ref = node->ref[slot], number = ref & UMB_REF_NUMBER;
         uint32_t kind = ref & UMB_REF_KIND;
+        if (kind == UMB_REF_NODE && is_left_out(v, number)) {
+            continue;
+        }
         if (kind == UMB_REF_NODE && whole && left[slot] == 0 && v->tree->below[number].count != UMB_RANGE_STALE) {
             copy_range(v, number);
         } else if (parts && kind == UMB_REF_OBJECT) {

@@ -163,8 +163,11 @@ static void fill_blocks(umb_index *index)
 {
     for (uint32_t k = 0; k < index->tree.block_count; ++k) {
         umb_node *block = &index->blocks[k];
+        block->layers = 0;
         for (uint32_t slot = 0; slot < block->count; ++slot) {
-            umb_aabb b = umb_node_bounds(umb_tree_node(&index->tree, block->ref[slot] & UMB_REF_NUMBER));
+            const umb_node *child = umb_tree_node(&index->tree, block->ref[slot] & UMB_REF_NUMBER);
+            umb_aabb b = umb_node_bounds(child);
+            block->layers |= child->layers;
             for (int i = 0; i < 3; ++i) {
                 block->min[i][slot] = b.min[i];
                 block->max[i][slot] = b.max[i];

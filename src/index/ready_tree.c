@@ -73,9 +73,10 @@ static void fetch_items(umb_tree_stock *s, uint32_t number, const umb_committed 
 static void fit_node(umb_tree_stock *s, uint32_t number, const umb_committed *scene)
 {
     umb_node *node = &s->nodes[number];
-    node->items = node->edits = 0;
+    node->items = node->edits = node->layers = 0;
     for (uint32_t slot = 0; slot < node->count; ++slot) {
         uint32_t ref = node->ref[slot];
+        node->layers |= umb_ref_layers(scene, s->nodes, ref);
         if (umb_slot_is_node(node, slot)) {
             umb_aabb box = umb_node_bounds(&s->nodes[ref]);
             umb_slot_set_box(node, slot, &box);
@@ -103,6 +104,14 @@ bool umb_ready_tree_fit(umb_ready_tree *t, const umb_committed *scene, int64_t *
     return t->cursor == 0;
 }
 
+/* Those of a node that has not been fitted are found later. */
+static void add_layers(umb_node *nodes, uint32_t number, uint32_t layers)
+{
+    for (; number != UMB_NONE; number = nodes[number].parent) {
+        nodes[number].layers |= layers;
+    }
+}
+
 void umb_ready_tree_follow(umb_ready_tree *t, const umb_committed *scene)
 {
     umb_tree_stock *s = &t->stock;
@@ -112,6 +121,9 @@ void umb_ready_tree_follow(umb_ready_tree *t, const umb_committed *scene)
         if (place != UMB_NONE) {
             umb_slot_set_box(&s->nodes[place / UMB_NODE_WIDTH], place % UMB_NODE_WIDTH, &scene->objects[object].bounds);
             umb_bvh_mark(&s->marks, place / UMB_NODE_WIDTH);
+            if (scene->remasked_count > 0 && scene->objects[object].remasked) {
+                add_layers(s->nodes, place / UMB_NODE_WIDTH, umb_layers_of(scene->objects[object].mask));
+            }
         }
     }
 }

@@ -66,7 +66,7 @@ static umb_aabb emit(umb_tree_edit *e, uint32_t split, uint32_t number)
 {
     uint32_t slots[UMB_NODE_WIDTH], made[UMB_NODE_WIDTH], count = umb_bvh_open(e->splits, split, slots);
     umb_node *node = &e->nodes[number];
-    node->count = node->items = node->edits = 0;
+    node->count = node->items = node->edits = node->layers = 0;
     for (uint32_t i = 0; i < count; ++i) { /* siblings side by side */
         made[i] = (slots[i] & UMB_BVH_ITEM) == 0 ? umb_tree_edit_new_node(e, number) : UMB_NONE;
     }

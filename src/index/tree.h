@@ -28,7 +28,7 @@ typedef struct umb_node {
     uint32_t edits;  /* items that came or went since it was built */
     float built;     /* half the surface of its box then */
     uint32_t cell;   /* of a grid, that this node is (voxels.h); 0: none */
-    uint32_t pad;
+    uint32_t layers; /* at least those of all items here and below (umb_layers_of()) */
 } umb_node;
 
 /* How the slots of a node come front to back from an eye, exactly (walk.h). Only trees whose cells are disjoint have

@@ -102,12 +102,13 @@ void umb_tree_edit_give_node(umb_tree_edit *e, uint32_t number)
     umb_number_set_add(&e->free, number);
 }
 
-/* The items below change by so many, from a node up to and without another. */
-static void count(umb_tree_edit *e, uint32_t node, uint32_t under, uint32_t by)
+/* The items below change by so many, from a node up to and without another; what comes is in some layers. */
+static void count(umb_tree_edit *e, uint32_t node, uint32_t under, uint32_t by, uint32_t layers)
 {
     for (; node != under && node != UMB_NONE; node = e->nodes[node].parent) {
         umb_node *n = &e->nodes[node];
         n->items += by;
+        n->layers |= layers;
         n->edits += e->wears;
         e->below[node].count = UMB_RANGE_STALE;
         if (e->wears && n->edits < UMB_EDITS_WORN && n->edits > n->items / 2 + UMB_NODE_WIDTH &&
@@ -134,6 +135,7 @@ static void write_slot(umb_tree_edit *e, uint32_t number, uint32_t slot, const u
     umb_node *node = &e->nodes[number];
     umb_slot_set_box(node, slot, box);
     node->ref[slot] = ref;
+    node->layers |= umb_ref_layers(e->scene, e->nodes, ref);
     if ((ref & UMB_REF_KIND) == UMB_REF_NODE) {
         e->nodes[ref].parent = number;
         e->nodes[ref].slot = slot;
@@ -227,7 +229,7 @@ void umb_tree_edit_tidy(umb_tree_edit *e, uint32_t number, uint32_t under)
 static void remove_place(umb_tree_edit *e, uint32_t place, uint32_t under)
 {
     uint32_t node = place / UMB_NODE_WIDTH;
-    count(e, node, under, (uint32_t)-1);
+    count(e, node, under, (uint32_t)-1, 0);
     cut_slot(e, node, place % UMB_NODE_WIDTH);
     e->slot_count -= 1;
     e->stale += 1;
@@ -372,7 +374,7 @@ void umb_tree_edit_insert(umb_tree_edit *e, umb_tree_way way, uint32_t node, uin
     }
     e->slot_count += 1;
     e->stale += 1;
-    count(e, in, under, 1);
+    count(e, in, under, 1, umb_ref_layers(e->scene, e->nodes, ref));
 }
 
 bool umb_tree_edit_hold(umb_tree_edit *e, uint32_t number, const umb_aabb *box, uint32_t ref)
@@ -400,6 +402,36 @@ void umb_tree_edit_set_box(umb_tree_edit *e, uint32_t ref, const umb_aabb *box)
     uint32_t place = umb_tree_edit_place(e, ref);
     umb_slot_set_box(&e->nodes[place / UMB_NODE_WIDTH], place % UMB_NODE_WIDTH, box);
     umb_bvh_mark(&e->marks, place / UMB_NODE_WIDTH);
+}
+
+/* ---- layers --------------------------------------------------------------------------------- */
+
+/* From a node up, as far as that changes anything. */
+static void relayer(umb_tree_edit *e, uint32_t number)
+{
+    for (; number != UMB_NONE; number = e->nodes[number].parent) {
+        umb_node *node = &e->nodes[number];
+        uint32_t layers = 0;
+        for (uint32_t slot = 0; slot < node->count; ++slot) {
+            layers |= umb_ref_layers(e->scene, e->nodes, node->ref[slot]);
+        }
+        if (layers == node->layers) {
+            return;
+        }
+        node->layers = layers;
+    }
+}
+
+void umb_tree_edit_relayer(umb_tree_edit *e)
+{
+    const umb_committed *scene = e->scene;
+    for (uint32_t i = 0; i < scene->moved_count && scene->remasked_count > 0; ++i) {
+        uint32_t id = scene->moved[i];
+        for (uint32_t place = scene->objects[id].remasked ? e->places[id] : UMB_NONE; place != UMB_NONE;
+             place = e->next != NULL ? e->next[place] : UMB_NONE) {
+            relayer(e, place / UMB_NODE_WIDTH);
+        }
+    }
 }
 
 /* ---- numbers -------------------------------------------------------------------------------- */
@@ -480,10 +512,10 @@ void umb_tree_edit_learn(umb_tree_edit *e)
     e->slot_count = 0;
     for (uint32_t k = e->node_count; k-- > 0;) {
         umb_node *node = &e->nodes[k];
-        node->items = 0;
-        node->edits = 0;
+        node->items = node->edits = node->layers = 0;
         for (uint32_t slot = 0; slot < node->count; ++slot) {
             uint32_t ref = node->ref[slot];
+            node->layers |= umb_ref_layers(e->scene, e->nodes, ref);
             if ((ref & UMB_REF_KIND) == UMB_REF_NODE) {
                 node->items += e->nodes[ref].items;
             } else {
@@ -521,6 +553,7 @@ bool umb_tree_edit_adopt(umb_tree_edit *e, umb_node *nodes, uint32_t node_count,
         e->next = NULL;
         e->next_capacity = 0;
     }
+    e->scene = scene;
     e->nodes = nodes;
     e->node_count = node_count;
     e->room = node_capacity;

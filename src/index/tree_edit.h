@@ -8,6 +8,7 @@
 #define UMB_TREE_EDIT_H
 
 #include "base/number_set.h"
+#include "scene/mask.h"
 #include "node_volume.h"
 
 /* In umb_node.edits: the node is in the list of worn ones. */
@@ -16,6 +17,7 @@
 /* A tree's arrays, with room to grow. */
 typedef struct umb_tree_edit {
     const umb_allocator *allocator;
+    const umb_committed *scene; /* whose items these are */
     umb_node *nodes;
     uint32_t node_count; /* numbers up to here are in use or free */
     uint32_t slot_count; /* that name items */
@@ -107,6 +109,24 @@ bool umb_tree_edit_hold(umb_tree_edit *e, uint32_t node, const umb_aabb *box, ui
 
 /* The first node, from this one up, whose box holds the box; the root if none does. */
 uint32_t umb_tree_edit_holder(const umb_tree_edit *e, uint32_t node, const umb_aabb *box);
+
+/* The layers of what a slot names; the item's or node's own are known. */
+static inline uint32_t umb_ref_layers(const umb_committed *scene, const umb_node *nodes, uint32_t ref)
+{
+    uint32_t number = ref & UMB_REF_NUMBER;
+    switch (ref & UMB_REF_KIND) {
+    case UMB_REF_NODE:
+        return nodes[number].layers;
+    case UMB_REF_OBJECT:
+        return scene->masked ? umb_layers_of(scene->objects[number].mask) : UINT32_MAX;
+    default:
+        return scene->masked ? umb_layers_of(scene->occluder_masks[number]) : UINT32_MAX;
+    }
+}
+
+/* The layers of the nodes around objects that the commit put into others: exactly those that are there. Elsewhere, layers only
+ * grow until a node is made anew. */
+void umb_tree_edit_relayer(umb_tree_edit *e);
 
 /* Give an item that is in one place another box. */
 void umb_tree_edit_set_box(umb_tree_edit *e, uint32_t ref, const umb_aabb *box);

@@ -277,6 +277,7 @@ bool umb_update_follow(umb_updater *u, umb_tree_edit *e, const umb_committed *sc
     if (structure) {
         bring(u, e, scene);
     }
+    umb_tree_edit_relayer(e);
     umb_tree_edit_renew_worn(e, MOST_RENEWED);
     if (e->failed || !umb_update_reserve(u, e)) {
         return false;

@@ -11,6 +11,12 @@ typedef struct umb_mask {
     bool all; /* all of the bits are wanted, not one of them */
 } umb_mask;
 
+/* All layers that something with a mask is in, for unions of several. */
+static inline uint32_t umb_layers_of(uint32_t mask)
+{
+    return mask != 0 ? mask : UINT32_MAX;
+}
+
 /* True if something in the layers of mask is in the view. */
 static inline bool umb_mask_takes(umb_mask view, uint32_t mask)
 {

@@ -195,6 +195,18 @@ void umb_motion_shift(umb_scene *scene, const double shift[3])
     }
 }
 
+void umb_motion_reshape(umb_scene *scene, umb_object_slot *slot, const umb_aabb *bounds)
+{
+    if (slot->mover == UMB_NONE) {
+        return;
+    }
+    make_due(&scene->moving, slot->mover, UMB_DUE_FRESH);
+    for (int i = 0; i < 3 && bounds != NULL; ++i) { /* it may be stopped where nobody can tell where it is */
+        slot->bounds.min[i] = fminf(slot->bounds.min[i], bounds->min[i]);
+        slot->bounds.max[i] = fmaxf(slot->bounds.max[i], bounds->max[i]);
+    }
+}
+
 void umb_motion_remove(umb_scene *scene, const umb_object_slot *slot)
 {
     if (slot->mover != UMB_NONE) {

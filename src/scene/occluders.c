@@ -39,6 +39,7 @@ static void put(umb_scene *scene, uint32_t number, const umb_occluder *occluder,
     source->group = group;
     source->index = index;
     scene->committed_masks[number] = mask_of(scene, occluder, source);
+    scene->committed.masked = scene->committed.masked || scene->committed_masks[number] != 0;
     *home_of(scene, occluder, source) = number;
     list(scene, number);
 }
@@ -66,6 +67,16 @@ void umb_occluders_add_free(umb_scene *scene, const umb_occluder *occluder, umb_
     umb_committed *c = &scene->committed;
     put(scene, c->occluder_count, occluder, group, index);
     c->occluder_count += 1;
+}
+
+void umb_occluders_change(umb_scene *scene, uint32_t number, const umb_occluder *occluder)
+{
+    bool other = scene->committed_occluders[number].mesh != occluder->mesh;
+    scene->committed_occluders[number] = *occluder;
+    scene->committed_masks[number] = scene->objects[occluder->owner].mask;
+    if (other) {
+        list(scene, number);
+    }
 }
 
 void umb_occluders_remove(umb_scene *scene, uint32_t number)

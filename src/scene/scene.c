@@ -286,6 +286,35 @@ umb_result umb_scene_place_object(umb_scene *scene, uint32_t object, const umb_t
     return result;
 }
 
+umb_result umb_scene_shape_object(umb_scene *scene, uint32_t object, umb_shape shape, const umb_aabb *bounds)
+{
+    umb_object_slot *slot = find_object(scene, object);
+    if (slot == NULL) {
+        return fail_object(scene, object);
+    }
+    umb_outcome seen;
+    const umb_aabb *box = NULL;
+    umb_transform transform = slot->placement.transform;
+    umb_result result = look(scene, shape, &transform, &seen);
+    if (result == UMB_OK && slot->mover == UMB_NONE) {
+        result = choose_bounds(scene, &seen, bounds, &box);
+    }
+    if (result != UMB_OK) {
+        return result;
+    }
+    umb_weld_dissolve(scene, slot->weld);
+    double at[3];
+    memcpy(at, slot->placement.at, sizeof at);
+    slot->placement.shape = shape;
+    umb_scene_place(&slot->placement, &transform, &seen);
+    memcpy(slot->placement.at, at, sizeof at);
+    slot->bounds = box != NULL ? *box : slot->bounds;
+    umb_motion_reshape(scene, slot, seen.bounds);
+    umb_scene_touch_object(scene, object);
+    scene->structure_changed = true;
+    return UMB_OK;
+}
+
 umb_result umb_scene_flag_object(umb_scene *scene, uint32_t object, uint32_t flags)
 {
     umb_object_slot *slot = find_object(scene, object);

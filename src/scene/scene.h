@@ -33,6 +33,7 @@ typedef struct umb_object {
                              has one */
     bool boxed : 1;       /* body, and it is a box */
     bool box : 1;         /* boxed, and it stands along the axes: it is its bounds, to the bit */
+    bool remasked : 1;    /* the version that last touched it gave it another mask, and no more than that or a move */
     umb_transform transform;
     uint32_t mask;        /* its layers (mask.h) */
 } umb_object;
@@ -48,6 +49,8 @@ typedef struct umb_committed {
     /* The change lists, each entry once. A reader that knows the version before this one needs no more to follow. */
     const uint32_t *moved;         /* live objects that this version gave another place or flags */
     uint32_t moved_count;
+    uint32_t remasked_count;       /* of these, that are remasked */
+    bool masked;                   /* some object or occluder has, or had, a mask */
     /* What the last growth of structure changed; a reader that knows the structure before follows by these. */
     const uint32_t *came, *went;   /* objects that are live now and were not; that were and are no more */
     const uint32_t *replaced;      /* occluder numbers, used before or now, that hold another occluder or none */

@@ -189,6 +189,7 @@ static void commit_object(umb_scene *scene, uint32_t id)
     umb_committed *c = &scene->committed;
     umb_object_slot *slot = &scene->objects[id];
     bool was_live = scene->committed_objects[id].live;
+    uint32_t was_in = scene->committed_objects[id].mask;
     uint32_t occluder = scene->committed_objects[id].occluder;
     scene->committed_objects[id] = make_object(scene, slot, occluder);
     if (owns_occluder(scene, slot)) {
@@ -196,13 +197,15 @@ static void commit_object(umb_scene *scene, uint32_t id)
         if (occluder == UMB_NONE) {
             umb_occluders_add_owned(scene, &owned);
         } else {
-            scene->committed_occluders[occluder] = owned;
-            scene->committed_masks[occluder] = slot->mask;
+            umb_occluders_change(scene, occluder, &owned);
         }
     }
     bool live = scene->committed_objects[id].live;
+    c->masked = c->masked || slot->mask != 0;
     if (live && was_live) {
         scene->committed_moved[c->moved_count++] = id;
+        scene->committed_objects[id].remasked = was_in != slot->mask;
+        c->remasked_count += was_in != slot->mask;
     } else if (live) {
         scene->committed_came[c->came_count++] = id;
     } else if (was_live) {
@@ -228,7 +231,7 @@ static umb_result commit_structure(umb_scene *scene)
     forget_replaced(scene);
     extend_objects(scene);
     remove_occluders(scene);
-    scene->committed.moved_count = 0;
+    scene->committed.moved_count = scene->committed.remasked_count = 0;
     for (uint32_t i = 0; i < scene->touched_count; ++i) {
         commit_object(scene, scene->touched[i]);
     }
@@ -270,6 +273,7 @@ static inline __attribute__((always_inline)) void fetch(const umb_scene *scene, 
 static void commit_moved(umb_scene *scene)
 {
     uint32_t count = 0;
+    scene->committed.remasked_count = 0;
     bool large = scene->object_ids.used > IN_CACHES;
     for (uint32_t i = 0; i < scene->touched_count; ++i) {
         if (large) {
@@ -286,6 +290,11 @@ static void commit_moved(umb_scene *scene)
         object->box = is_box(object, p);
         bool masked = object->mask != slot->mask;
         object->mask = slot->mask;
+        object->remasked = masked && object->live;
+        if (masked) {
+            scene->committed.remasked_count += object->remasked;
+            scene->committed.masked = true;
+        }
         if (object->occluder != UMB_NONE) {
             umb_occluder *occluder = &scene->committed_occluders[object->occluder];
             occluder->transform = p->transform;

@@ -165,6 +165,8 @@ void umb_scene_touch_object(umb_scene *scene, uint32_t object);
 void umb_occluders_add_owned(umb_scene *scene, const umb_occluder *occluder);
 void umb_occluders_add_free(umb_scene *scene, const umb_occluder *occluder, umb_weld_group *group, uint32_t index);
 void umb_occluders_remove(umb_scene *scene, uint32_t number);
+/* The same number, owned by the same object, is another occluder. */
+void umb_occluders_change(umb_scene *scene, uint32_t number, const umb_occluder *occluder);
 
 /* Note that a hand-made occluder changed: the commit takes it out and puts it in again. */
 void umb_scene_renew_occluder(umb_scene *scene, uint32_t occluder);
@@ -181,6 +183,8 @@ bool umb_motion_is_exact(const umb_scene *scene, const umb_object_slot *slot);
 umb_aabb umb_scene_shift_box(const umb_aabb *b, const double shift[3]);
 /* The origin has moved: everybody is to be asked anew. */
 void umb_motion_shift(umb_scene *scene, const double shift[3]);
+/* The object of a slot has another shape, whose bounds where the object was last known to be are these; NULL: it has none. */
+void umb_motion_reshape(umb_scene *scene, umb_object_slot *slot, const umb_aabb *bounds);
 /* The object of a slot is removed. */
 void umb_motion_remove(umb_scene *scene, const umb_object_slot *slot);
 void umb_motion_free(umb_scene *scene);

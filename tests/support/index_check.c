@@ -11,6 +11,7 @@
 
 #include "geometry/transform.h"
 #include "random_boxes.h"
+#include "scene/mask.h"
 
 /* ---- parts ---------------------------------------------------------------------------------- */
 
@@ -64,7 +65,10 @@ static uint32_t gather_parts(const umb_tree *t, const umb_committed *c, uint32_t
             umb_aabb below = umb_node_bounds(&t->nodes[what]);
             assert_memory_equal(&box, &below, sizeof(box));
             nodes += gather_parts(t, c, what, out);
+            assert_true((t->nodes[what].layers & ~n->layers) == 0);
         } else {
+            uint32_t mask = (ref & UMB_REF_KIND) == UMB_REF_OBJECT ? c->objects[what].mask : c->occluder_masks[what];
+            assert_true((umb_layers_of(mask) & ~n->layers) == 0);
             assert_true(out->count < t->item_count);
             add_part(out, (ref & UMB_REF_KIND) == UMB_REF_OBJECT ? what : c->object_count + what, &box);
         }
