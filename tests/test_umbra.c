@@ -187,7 +187,7 @@ static void check_rays(double hu, double hv, double outer, uint64_t seed)
     uint32_t count = outer == 0.0 ? 4 : 8;
     for (uint32_t k = 0; k < count; ++k) {
         umb_ray_kind kind = outer == 0.0 ? UMB_RAY_SLAB : k < 4 ? UMB_RAY_NEAR : UMB_RAY_FAR;
-        assert_int_equal(umb_ray_map_begin(&maps[k], &a, &frames[k % 4], kind, outer, 64, 1), UMB_OK);
+        assert_int_equal(umb_ray_map_begin(&maps[k], &a, &frames[k % 4], &(umb_ray_layout){kind, outer, kind == UMB_RAY_SLAB ? 24 : 64, 64, 1}), UMB_OK);
     }
     for (uint32_t i = 0; i < (is_small() ? 2000u : 20000u); ++i) {
         double from[3] = {between(&d, -hu, hu), between(&d, -hv, hv), 0}, angle = between(&d, 0, 6.283185307179586);
@@ -256,13 +256,13 @@ static void test_kernels(void **state)
         umb_ray_map scalar = {0}, other = {0};
         bool half = umbrae == 1;
         umb_ray_frame frame = {2, 2, -1, 1, {0, 0, 0}, 0, 1, 2, 1, 1e-12, umbrae == 3 ? 1.0f : INFINITY};
-        assert_int_equal(umb_ray_map_begin(&scalar, &a, &frame, UMB_RAY_SLAB, 0.0, 128, umbrae), UMB_OK);
+        assert_int_equal(umb_ray_map_begin(&scalar, &a, &frame, &(umb_ray_layout){UMB_RAY_SLAB, 0.0, 16, 128, umbrae}), UMB_OK);
         draw_bodies(umb_umbra_kernels_get(UMB_ISA_SCALAR), &scalar, half);
         for (size_t k = 0; k < sizeof isas / sizeof isas[0]; ++k) {
             if (!umb_isa_available(isas[k])) {
                 continue;
             }
-            assert_int_equal(umb_ray_map_begin(&other, &a, &frame, UMB_RAY_SLAB, 0.0, 128, umbrae), UMB_OK);
+            assert_int_equal(umb_ray_map_begin(&other, &a, &frame, &(umb_ray_layout){UMB_RAY_SLAB, 0.0, 16, 128, umbrae}), UMB_OK);
             draw_bodies(umb_umbra_kernels_get(isas[k]), &other, half);
             for (uint32_t t = 0; t < scalar.rows * scalar.columns; ++t) {
                 assert_int_equal(scalar.drawn[t], other.drawn[t]);
@@ -328,7 +328,7 @@ static void test_far(void **state)
         b.vertices[1] = b.vertices[2] = (umb_ray_point){u + turn, v + width, z + between(&d, -0.1, 0.1)};
         b.vertices[3].z += up;
         b.vertices[2].z += up;
-        assert_int_equal(umb_ray_map_begin(&map, &a, &frame, UMB_RAY_SLAB, 0.0, 256, 1), UMB_OK);
+        assert_int_equal(umb_ray_map_begin(&map, &a, &frame, &(umb_ray_layout){UMB_RAY_SLAB, 0.0, 32, 256, 1}), UMB_OK);
         if (umb_ray_map_block_far(&map, umb_umbra_kernels_get(UMB_ISA_AUTO), &b, false)) {
             drawn += check_wall(&map, &b, &d);
         }

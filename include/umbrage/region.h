@@ -35,7 +35,8 @@ typedef struct umb_region_query {
                               cells and single points are cells too */
     umb_region_up up;
     /* Pixels along each side of an occlusion map: 64 to 2048, rounded up to a multiple of 64; 0: 512. Maps by offset and slope
-       have an eighth as many along the offset (a multiple of 64 too): all but near things need fewer there. */
+       have a sixteenth of the pixels of such a square: N by N / 16 along the offset, or twice or four times as many (4096 at
+       most) by fewer, where things are seen from far away for the cell's size. */
     uint32_t resolution;
     /* Intervals that are kept for each horizontal direction: 1 to 8; 0: 1 with half_umbra, 8 without a vertical, else 2. */
     uint32_t umbrae;
@@ -102,7 +103,7 @@ typedef struct umb_region_pixel {
     bool live;         /* some ray of the method goes through the pixel */
 } umb_region_pixel;
 
-/* Copy an occlusion map after the last umb_region_solve, to look at: *side rows by where rays cross the inner square (or
+/* Copy an occlusion map after the last umb_region_solve, to look at, sampled to a square of the resolution: *side rows by where rays cross the inner square (or
  * their offset from the cell's middle), each of *side pixels by where they cross the outer one (or their slope). Maps are numbered from 0:
  * of the rays towards + and - of the axis after up (x, y, z, x), then of the one after that; with squares four more, of
  * the rays that leave the cell sideways; without a vertical of +x, -x, +y, -y, +z, -z, heights being along the axis two

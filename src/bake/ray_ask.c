@@ -236,7 +236,7 @@ static void sum_up_group(umb_ray_map *m, uint32_t gi, uint32_t gj)
 {
     uint32_t groups = m->columns / UMB_TILE;
     umb_umbra_summary s = {INFINITY, -INFINITY, -INFINITY};
-    for (uint32_t i = gi * UMB_TILE; i < (gi + 1) * UMB_TILE; ++i) {
+    for (uint32_t i = gi * m->group_rows; i < (gi + 1) * m->group_rows; ++i) {
         const umb_umbra_summary *row = &m->summaries[i * m->columns + gj * UMB_TILE];
         for (uint32_t j = 0; j < UMB_TILE; ++j) {
             s.top = row[j].top < s.top ? row[j].top : s.top;
@@ -248,21 +248,22 @@ static void sum_up_group(umb_ray_map *m, uint32_t gi, uint32_t gj)
     m->stale[gi * groups + gj] = false;
 }
 
-static beam rectangle(const umb_ray_map *m, uint32_t i, uint32_t j, uint32_t size)
+/* Of tiles. */
+static beam rectangle(const umb_ray_map *m, uint32_t i, uint32_t j, uint32_t rows, uint32_t columns)
 {
-    return (beam){{m->s0 + i * m->ds, m->s0 + (i + size) * m->ds}, {m->t0 + j * m->dt, m->t0 + (j + size) * m->dt}};
+    double s = UMB_TILE * m->ds, t = UMB_TILE * m->dt;
+    return (beam){{m->s0 + i * s, m->s0 + (i + rows) * s}, {m->t0 + j * t, m->t0 + (j + columns) * t}};
 }
 
-/* The range of u over a rectangle of pixels: false if no line meets the shape there. */
-static bool range_over(const asked *q, uint32_t i, uint32_t j, uint32_t size, double *u_min, double *u_max)
+/* The range of u over a rectangle of the map: false if no line meets the shape there. */
+static bool range_over(const asked *q, const beam *b, double *u_min, double *u_max)
 {
     if (q->thin) {
         *u_min = q->shape->u_min - q->map->frame->error;
         *u_max = q->shape->u_max + q->map->frame->error;
         return true;
     }
-    beam b = rectangle(q->map, i, j, size);
-    return range_of_u(q->map, q->shape, &b, u_min, u_max);
+    return range_of_u(q->map, q->shape, b, u_min, u_max);
 }
 
 /* The pixels of a tile that lines to the shape may go through. */
@@ -293,7 +294,8 @@ static bool tile_hides(const asked *a, uint32_t i, uint32_t j)
     umb_umbra_query q;
     double u_min, u_max;
     const float *span = m->spans[i * (m->columns / UMB_TILE) + j / UMB_TILE];
-    if (!range_over(a, i * UMB_TILE, j * UMB_TILE, UMB_TILE, &u_min, &u_max)) {
+    beam b = rectangle(m, i, j, 1, 1);
+    if (!range_over(a, &b, &u_min, &u_max)) {
         return true;
     }
     bool bounded = m->drawn[tile] && bounds_of(m->frame, a->shape, u_min, u_max, span[0], span[1], span[1], &q);
@@ -310,9 +312,10 @@ static bool tile_hides(const asked *a, uint32_t i, uint32_t j)
 static bool group_holds(const asked *a, uint32_t gi, uint32_t gj, bool *touched)
 {
     umb_ray_map *m = a->map;
-    uint32_t group = gi * (m->columns / UMB_TILE) + gj, side = UMB_TILE * UMB_TILE;
+    uint32_t group = gi * (m->columns / UMB_TILE) + gj;
     double u_min, u_max;
-    *touched = range_over(a, gi * side, gj * side, side, &u_min, &u_max);
+    beam b = rectangle(m, gi * m->group_rows, gj * UMB_TILE, m->group_rows, UMB_TILE);
+    *touched = range_over(a, &b, &u_min, &u_max);
     if (!*touched) {
         return true;
     }
@@ -331,7 +334,7 @@ static bool group_hides(const asked *a, uint32_t gi, uint32_t gj, uint32_t *tile
     if (group_holds(a, gi, gj, &touched)) {
         return true;
     }
-    for (uint32_t i = gi * UMB_TILE; i < (gi + 1) * UMB_TILE; ++i) {
+    for (uint32_t i = gi * m->group_rows; i < (gi + 1) * m->group_rows; ++i) {
         double s = m->s0 + i * UMB_TILE * m->ds;
         lanes l = range_of_lanes(a, s, s + UMB_TILE * m->ds);
         double from = umb_most(l.from / UMB_TILE, gj * UMB_TILE), to = umb_least(l.to / UMB_TILE, (gj + 1) * UMB_TILE - 1.0);
@@ -350,16 +353,16 @@ static bool group_hides(const asked *a, uint32_t gi, uint32_t gj, uint32_t *tile
 
 bool umb_ray_map_hides(umb_ray_map *m, const umb_umbra_kernels *kernels, const umb_ray_shape *shape, uint32_t *tile)
 {
-    uint32_t side = UMB_TILE * UMB_TILE;
+    uint32_t high = UMB_TILE * m->group_rows, wide = UMB_TILE * UMB_TILE;
     asked a;
     begin(&a, m, kernels, shape);
-    for (uint32_t gi = 0; gi < m->rows / UMB_TILE; ++gi) {
-        double s = m->s0 + gi * side * m->ds;
-        lanes l = range_of_lanes(&a, s, s + side * m->ds);
+    for (uint32_t gi = 0; gi < m->rows / m->group_rows; ++gi) {
+        double s = m->s0 + gi * high * m->ds;
+        lanes l = range_of_lanes(&a, s, s + high * m->ds);
         if (!(l.from <= l.to)) {
             continue;
         }
-        for (uint32_t gj = (uint32_t)l.from / side; gj <= (uint32_t)l.to / side; ++gj) {
+        for (uint32_t gj = (uint32_t)l.from / wide; gj <= (uint32_t)l.to / wide; ++gj) {
             if (!group_hides(&a, gi, gj, tile)) {
                 return false;
             }
@@ -387,7 +390,7 @@ bool umb_ray_map_closed(umb_ray_map *m, double z_min, double z_max, double gap)
         return false;
     }
     uint32_t groups = m->columns / UMB_TILE;
-    for (uint32_t g = 0; g < groups * (m->rows / UMB_TILE); ++g) {
+    for (uint32_t g = 0; g < groups * (m->rows / m->group_rows); ++g) {
         if (m->stale[g]) {
             sum_up_group(m, g / groups, g % groups);
         }

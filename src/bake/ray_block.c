@@ -246,7 +246,7 @@ static void draw_run(band *d, uint32_t group, uint32_t from, uint32_t to)
             m->summaries[d->row * m->columns + j] = draw.summaries[j - first];
         }
     }
-    m->stale[(d->row / UMB_TILE) * groups + group] = true;
+    m->stale[(d->row / m->group_rows) * groups + group] = true;
 }
 
 /* Tiles of the row that lines through the blocker may go through. */

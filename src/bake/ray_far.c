@@ -113,7 +113,7 @@ static void draw_tile(drawing *d, uint32_t row, uint32_t column)
         m->drawn[tile] = true;
     }
     m->summaries[tile] = d->kernels->fill(t, m->umbrae, &d->strip, d->half);
-    m->stale[(row / UMB_TILE) * (m->columns / UMB_TILE) + column / UMB_TILE] = true;
+    m->stale[(row / m->group_rows) * (m->columns / UMB_TILE) + column / UMB_TILE] = true;
 }
 
 /* Chains as most lines see them; false if the occluder is near. */

@@ -95,16 +95,16 @@ static void find_span(const umb_ray_map *m, uint32_t row, uint32_t group, float 
     span[1] = nextafterf((float)ub, INFINITY);
 }
 
-/* Over the eight rows of a group: the largest ua, the least and the largest ub. */
+/* Over the rows of a group: the largest ua, the least and the largest ub. */
 static void sum_up_spans(umb_ray_map *m)
 {
     uint32_t groups = m->columns / UMB_TILE;
-    for (uint32_t g = 0; g < groups * (m->rows / UMB_TILE); ++g) {
+    for (uint32_t g = 0; g < groups * (m->rows / m->group_rows); ++g) {
         float *sum = m->group_spans[g];
         sum[0] = sum[2] = -INFINITY;
         sum[1] = INFINITY;
-        for (uint32_t i = 0; i < UMB_TILE; ++i) {
-            const float *span = m->spans[(g / groups * UMB_TILE + i) * groups + g % groups];
+        for (uint32_t i = 0; i < m->group_rows; ++i) {
+            const float *span = m->spans[(g / groups * m->group_rows + i) * groups + g % groups];
             sum[0] = fmaxf(sum[0], span[0]);
             sum[1] = fminf(sum[1], span[1]);
             sum[2] = fmaxf(sum[2], span[1]);
@@ -134,7 +134,7 @@ static size_t place(size_t *bytes, size_t count, size_t size)
 
 static map_layout lay_out(uint32_t rows, uint32_t columns, uint32_t umbrae)
 {
-    size_t tiles = (size_t)rows * columns, groups = tiles / (UMB_TILE * UMB_TILE);
+    size_t tiles = (size_t)rows * columns, high = rows < UMB_TILE ? rows : UMB_TILE, groups = tiles / (high * UMB_TILE);
     map_layout l = {0};
     l.intervals = place(&l.bytes, tiles * umbrae, sizeof(umb_umbra_tile));
     l.summaries = place(&l.bytes, tiles, sizeof(umb_umbra_summary));
@@ -148,11 +148,10 @@ static map_layout lay_out(uint32_t rows, uint32_t columns, uint32_t umbrae)
 }
 
 umb_result umb_ray_map_begin(umb_ray_map *map, const umb_allocator *a, const umb_ray_frame *frame,
-                             umb_ray_kind kind, double outer, uint32_t resolution, uint32_t umbrae)
+                             const umb_ray_layout *layout)
 {
-    uint32_t columns = resolution / UMB_TILE, least = UMB_TILE;
-    uint32_t rows = kind != UMB_RAY_SLAB ? columns : (columns / 8 + least - 1) / least * least;
-    map_layout l = lay_out(rows, columns, umbrae);
+    uint32_t rows = layout->rows / UMB_TILE, columns = layout->columns / UMB_TILE;
+    map_layout l = lay_out(rows, columns, layout->umbrae);
     char *block = (char *)map->intervals;
     if (map->bytes != l.bytes) {
         umb_ray_map_free(map, a);
@@ -161,7 +160,8 @@ umb_result umb_ray_map_begin(umb_ray_map *map, const umb_allocator *a, const umb
             return UMB_ERROR_MEMORY;
         }
     }
-    *map = (umb_ray_map){.frame = frame, .rows = rows, .columns = columns, .umbrae = umbrae, .bytes = l.bytes};
+    *map = (umb_ray_map){.frame = frame, .rows = rows, .columns = columns, .umbrae = layout->umbrae, .bytes = l.bytes};
+    map->group_rows = rows < UMB_TILE ? rows : UMB_TILE;
     map->intervals = (umb_umbra_tile *)(void *)(block + l.intervals);
     map->summaries = (umb_umbra_summary *)(void *)(block + l.summaries);
     map->groups = (umb_umbra_summary *)(void *)(block + l.groups);
@@ -170,10 +170,10 @@ umb_result umb_ray_map_begin(umb_ray_map *map, const umb_allocator *a, const umb
     map->stale = (bool *)(block + l.stale);
     map->spans = (float(*)[2])(void *)(block + l.spans);
     map->group_spans = (float(*)[3])(void *)(block + l.group_spans);
-    choose_rays(map, kind, outer);
+    choose_rays(map, layout->kind, layout->outer);
     for (uint32_t i = 0; i < rows; ++i) {
         for (uint32_t j = 0; j < columns; ++j) {
-            map->live[i * columns + j] = live_pixels(map, kind, outer, i, j);
+            map->live[i * columns + j] = live_pixels(map, layout->kind, layout->outer, i, j);
             map->summaries[i * columns + j] = map->live[i * columns + j] != 0
                                                ? (umb_umbra_summary){-INFINITY, INFINITY, INFINITY}
                                                : (umb_umbra_summary){INFINITY, -INFINITY, -INFINITY};
@@ -185,7 +185,7 @@ umb_result umb_ray_map_begin(umb_ray_map *map, const umb_allocator *a, const umb
     sum_up_spans(map);
     find_reach(map);
     memset(map->drawn, 0, (size_t)rows * columns * sizeof *map->drawn);
-    memset(map->stale, 1, (size_t)rows * columns / (UMB_TILE * UMB_TILE) * sizeof *map->stale);
+    memset(map->stale, 1, (size_t)rows / map->group_rows * (columns / UMB_TILE) * sizeof *map->stale);
     return UMB_OK;
 }
 

@@ -37,11 +37,12 @@ typedef struct umb_ray_map {
     const umb_ray_frame *frame;
     double alpha0, alpha1, beta0, beta1;
     double s0, t0, ds, dt; /* corner of pixel 0, 0 and the size of a pixel */
-    uint32_t rows, columns; /* of tiles, along s and along t: multiples of UMB_TILE */
+    uint32_t rows, columns; /* of tiles, along s and along t; columns: a multiple of UMB_TILE */
+    uint32_t group_rows;    /* of the rows: a divisor, UMB_TILE at most */
     uint32_t umbrae;
     umb_umbra_tile *intervals;     /* [tile][umbra]; of a tile never drawn into: not set */
     umb_umbra_summary *summaries;  /* per tile */
-    umb_umbra_summary *groups;     /* per UMB_TILE x UMB_TILE tiles */
+    umb_umbra_summary *groups;     /* per group_rows x UMB_TILE tiles */
     uint64_t *live;                /* per tile: pixels that rays go through */
     bool *drawn;                   /* per tile */
     bool *stale;                   /* per group: its summary is behind */
@@ -53,11 +54,17 @@ typedef struct umb_ray_map {
 
 typedef enum umb_ray_kind { UMB_RAY_SLAB, UMB_RAY_NEAR, UMB_RAY_FAR } umb_ray_kind;
 
-/* Lay out and empty a map. outer: of the squares. Squares have resolution x resolution pixels, slabs an eighth as many along
- * the offset, of which far things need less than of the slope. UMB_ERROR_MEMORY leaves nothing behind. A map that was set up before
- * with the same sizes keeps its memory. */
+/* What a map holds. Pixels along s: a multiple of UMB_TILE, above 64 of 64; along t: a multiple of 64. */
+typedef struct umb_ray_layout {
+    umb_ray_kind kind;
+    double outer; /* of the squares */
+    uint32_t rows, columns, umbrae;
+} umb_ray_layout;
+
+/* Lay out and empty a map. UMB_ERROR_MEMORY leaves nothing behind. A map that was set up before with the same sizes keeps
+ * its memory. */
 umb_result umb_ray_map_begin(umb_ray_map *map, const umb_allocator *a, const umb_ray_frame *frame,
-                             umb_ray_kind kind, double outer, uint32_t resolution, uint32_t umbrae);
+                             const umb_ray_layout *layout);
 void umb_ray_map_free(umb_ray_map *map, const umb_allocator *a);
 
 /* A point in a frame. */

@@ -155,14 +155,23 @@ static void set_cell(umb_region *region, const umb_region_query *query)
     umb_box_corners(q->min, q->max, region->corners);
 }
 
+static double surface_of(const umb_aabb *b)
+{
+    double x = (double)b->max[0] - b->min[0], y = (double)b->max[1] - b->min[1], z = (double)b->max[2] - b->min[2];
+    double surface = 2.0 * (x * y + y * z + z * x);
+    return surface > 0.0 && surface < INFINITY ? surface : 0.0; /* of no points: none */
+}
+
 static void count_objects(umb_region *region, const umb_committed *c)
 {
     region->objects = 0;
     region->triangles = 0;
+    region->surface = 0.0;
     for (uint32_t i = 0; i < c->object_count; ++i) {
         if (c->objects[i].live) {
             region->objects += 1;
             region->triangles += triangles_of(&c->objects[i]);
+            region->surface += surface_of(&c->objects[i].bounds);
         }
     }
 }

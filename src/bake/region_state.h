@@ -36,6 +36,7 @@ struct umb_region {
     uint64_t version;
     uint32_t objects; /* live ones of this version, and their triangles */
     uint64_t triangles;
+    double surface; /* of their bounds */
     uint32_t *used; /* occluders that the walk found not hidden */
     size_t used_capacity, used_count;
     umb_solids solids; /* bodies of these, once there is something to refine */
@@ -48,6 +49,9 @@ struct umb_region {
 
 /* Find the set of the cell by occlusion maps. */
 umb_result umb_region_walk(umb_region *region);
+
+/* How many pixels maps have for this cell: along s and along t. */
+void umb_region_grain(const umb_region *region, uint32_t *rows, uint32_t *columns);
 
 /* Decide about the objects of the set one by one; fills in refined and undecided. */
 umb_result umb_region_decide(umb_region *region, uint32_t effort);

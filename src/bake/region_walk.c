@@ -84,11 +84,12 @@ static void set_frames(umb_region *r)
 static umb_result begin_maps(umb_region *r)
 {
     const umb_region_query *q = &r->query;
+    umb_ray_layout layout = {.outer = q->outer, .umbrae = q->umbrae};
+    umb_region_grain(r, &layout.rows, &layout.columns);
     r->map_count = q->outer != 0.0 ? 8 : r->frame_count;
     for (uint32_t k = 0; k < r->map_count; ++k) {
-        umb_ray_kind kind = q->outer == 0.0 ? UMB_RAY_SLAB : k < 4 ? UMB_RAY_NEAR : UMB_RAY_FAR;
-        umb_result result = umb_ray_map_begin(&r->maps[k], &r->allocator, &r->frames[k % r->frame_count], kind, q->outer,
-                                              q->resolution, q->umbrae);
+        layout.kind = q->outer == 0.0 ? UMB_RAY_SLAB : k < 4 ? UMB_RAY_NEAR : UMB_RAY_FAR;
+        umb_result result = umb_ray_map_begin(&r->maps[k], &r->allocator, &r->frames[k % r->frame_count], &layout);
         if (result != UMB_OK) {
             return result;
         }
@@ -389,15 +390,12 @@ static umb_aabb node_box(const umb_node *n)
     return box;
 }
 
-/* Where nothing stands on a ground an occluder is drawn once the walk has come to its far side: what is asked about before
- * that lies beside it or in front of it, and would find intervals joined with it to begin too far away. */
+/* An occluder is drawn once the walk has come to its far side: what is asked about before that lies beside it or in front of
+ * it, and would find intervals joined with it to begin too far away. */
 static umb_result block_later(umb_region *r, const umb_committed *c, uint32_t number)
 {
     const umb_aabb *b = &c->occluders[number].bounds;
     double far = 0.0;
-    if (r->query.up != UMB_UP_NONE) {
-        return block(r, &c->occluders[number]);
-    }
     for (uint32_t i = 0; i < r->frame_count; i += 2) {
         uint32_t k = r->frames[i].axis_u;
         far = umb_most(far, umb_most(r->query.min[k] - b->min[k], b->max[k] - r->query.max[k]));

@@ -10,6 +10,7 @@
 #define UMB_TILE 8 /* pixels along a side of a tile, and tiles along a side of a group */
 #define UMB_UMBRA_VERTICES 64
 #define UMB_UMBRA_EDGES 160
+#define UMB_UMBRA_ENDLESS 1e30f /* more than any slope that is compared with it; not infinite: that is empty intervals */
 
 /* One interval a pixel: what lies between its top and its bottom, as every point of the cell sees it, and beyond
  * depth, is hidden. Empty: top -INFINITY, bottom INFINITY. */

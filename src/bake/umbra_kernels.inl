@@ -12,7 +12,6 @@
 #define COLUMNS ((UMB_TILE + 1) * UMB_TILE) /* corners along t of the widest run, and some to spare */
 #define ROUNDING 0x1p-21f                   /* of a quotient, and of what is added to it */
 #define LEAST 1e-30f
-#define ENDLESS 1e30f                      /* more than any slope that is compared with it */
 
 /* What is known at each corner of a run's pixels. */
 typedef struct corner_values {
@@ -333,14 +332,14 @@ UMB_INLINE void keep(umb_umbra_tile *tiles, uint32_t umbrae, uint32_t at, sums *
 }
 
 /* No ray passes above a top that all of the cell sees as steep as rays get: it may as well be endless. Nor below such a
- * bottom. Not infinite, which stands for empty intervals. */
+ * bottom.  */
 UMB_INLINE void open_ends(sums *c, float steep)
 {
     umb_iv over = (umb_iv)(c->top >= steep), under = (umb_iv)(c->bottom <= -steep);
-    c->top = umb_fv_select(over, umb_fv_set(ENDLESS), c->top);
-    c->top_far = umb_fv_select(over, umb_fv_set(ENDLESS), c->top_far);
-    c->bottom = umb_fv_select(under, umb_fv_set(-ENDLESS), c->bottom);
-    c->bottom_far = umb_fv_select(under, umb_fv_set(-ENDLESS), c->bottom_far);
+    c->top = umb_fv_select(over, umb_fv_set(UMB_UMBRA_ENDLESS), c->top);
+    c->top_far = umb_fv_select(over, umb_fv_set(UMB_UMBRA_ENDLESS), c->top_far);
+    c->bottom = umb_fv_select(under, umb_fv_set(-UMB_UMBRA_ENDLESS), c->bottom);
+    c->bottom_far = umb_fv_select(under, umb_fv_set(-UMB_UMBRA_ENDLESS), c->bottom_far);
 }
 
 static void merge_full(umb_umbra_tile *tiles, uint32_t umbrae, uint32_t at, float steep, sums *c, umb_iv here)

@@ -1,0 +1,44 @@
+/* How fine occlusion maps are along their two sides. */
+#include <math.h>
+
+#include "region_state.h"
+
+/* What a ray goes through in the mean before it ends, were the scene's objects spread evenly over its bounds: a body's
+ * shadow is a quarter of its surface, averaged over all directions. */
+static double free_path(const umb_region *r, const umb_aabb *b)
+{
+    double volume = 1.0;
+    for (int k = 0; k < 3; ++k) {
+        volume *= (double)b->max[k] - b->min[k];
+    }
+    double path = 4.0 * volume / r->surface;
+    return path > 0.0 && path < INFINITY ? path : 0.0;
+}
+
+/* How far away the cell sees: five free paths from where the scene begins. */
+static double sight_of(const umb_region *r)
+{
+    const umb_aabb *b = &umb_index_tree(r->index)->bounds;
+    double gap = 0.0;
+    for (int k = 0; k < 3; ++k) {
+        gap = fmax(gap, fmax(r->query.min[k] - b->max[k], b->min[k] - r->query.max[k]));
+    }
+    return gap + 5.0 * free_path(r, b);
+}
+
+/* Lines of a slab's pixel are a beam as wide as its step in offset and its step in slope times the distance: for the same
+ * number of pixels it is thinnest, where things are seen, when both are equal. Answers do not depend on being right. */
+void umb_region_grain(const umb_region *r, uint32_t *rows, uint32_t *columns)
+{
+    uint32_t n = r->query.resolution, side = UMB_TILE * UMB_TILE;
+    *rows = *columns = n;
+    if (r->query.outer != 0.0) {
+        return;
+    }
+    double ratio = sight_of(r) / (r->frames[0].hu + r->frames[0].hv);
+    uint32_t fine = ratio > 128.0 ? 4 : ratio > 32.0 ? 2 : 1;
+    *columns = n * fine < 4096 ? n * fine : 4096 / n * n;
+    *rows = n * n / 16 / *columns;
+    *rows = (*rows + UMB_TILE - 1) / UMB_TILE * UMB_TILE;
+    *rows = *rows > side ? (*rows + side - 1) / side * side : *rows;
+}
