@@ -1,11 +1,19 @@
 /* soak: zero wrongly hidden, over many views.
  *
+<<<<<<< HEAD
  *   soak [--short] [--out FOLDER] [--threads N] [--scale X] [--only TEXT] [--views N] [--rays N]
+=======
+ *   soak [--short] [--out FOLDER] [--threads N] [--scale X] [--only TEXT] [--without TEXT] [--views N]
+>>>>>>> 99d1f24 (soak: --without leaves parts out, so that views and view cells can run apart)
  *        [--plant 1|2] [--part NAME --view K]
  *
  * Prints the tables of docs/results/soak.md: views, then view cells. What is done is kept in FOLDER (out/soak), a file for
  * each part of the plan, and taken up by the next run of the same program over the same scenes.
+<<<<<<< HEAD
  * --only: parts whose name or family contains TEXT. --views: of each part no more than N new ones. --rays: of each view cell.
+=======
+ * --only: parts whose name or family contains TEXT. --without: but not those whose name contains it. --views: of each part no more than N new ones.
+>>>>>>> 99d1f24 (soak: --without leaves parts out, so that views and view cells can run apart)
  * --plant: cull a scene with a planted mistake (1: objects too small, 2: occluders too large),
  * which must be found. --part --view: one view alone, told in full. FOLDER/wrongly-hidden.txt and
  * unconfirmed.txt name objects with their lines.
@@ -26,7 +34,7 @@ enum { DONE = 0, WRONG = 1, USAGE = 2, INPUT = 3, STOPPED = 4 };
 
 typedef struct settings {
     bool full;
-    const char *out, *only, *part;
+    const char *out, *only, *without, *part;
     uint32_t threads, most_batches;
     double scale;
     plant planted;
@@ -63,6 +71,8 @@ static bool read_settings(int count, char **words, settings *s)
             s->out = value;
         } else if (strcmp(word, "--only") == 0) {
             s->only = value;
+        } else if (strcmp(word, "--without") == 0) {
+            s->without = value;
         } else if (strcmp(word, "--part") == 0) {
             s->part = value;
         } else if (strcmp(word, "--view") == 0) {
@@ -254,6 +264,9 @@ static bool wanted(const settings *s, const soak_part *part)
 {
     if (s->part != NULL) {
         return strcmp(s->part, part->name) == 0;
+    }
+    if (s->without != NULL && strstr(part->name, s->without) != NULL) {
+        return false;
     }
     return strstr(part->name, s->only) != NULL || strstr(part->family, s->only) != NULL;
 }
