@@ -1,19 +1,12 @@
 /* soak: zero wrongly hidden, over many views.
  *
-<<<<<<< HEAD
- *   soak [--short] [--out FOLDER] [--threads N] [--scale X] [--only TEXT] [--views N] [--rays N]
-=======
  *   soak [--short] [--out FOLDER] [--threads N] [--scale X] [--only TEXT] [--without TEXT] [--views N]
->>>>>>> 99d1f24 (soak: --without leaves parts out, so that views and view cells can run apart)
- *        [--plant 1|2] [--part NAME --view K]
+ *        [--rays N] [--plant 1|2] [--part NAME --view K]
  *
  * Prints the tables of docs/results/soak.md: views, then view cells. What is done is kept in FOLDER (out/soak), a file for
  * each part of the plan, and taken up by the next run of the same program over the same scenes.
-<<<<<<< HEAD
- * --only: parts whose name or family contains TEXT. --views: of each part no more than N new ones. --rays: of each view cell.
-=======
- * --only: parts whose name or family contains TEXT. --without: but not those whose name contains it. --views: of each part no more than N new ones.
->>>>>>> 99d1f24 (soak: --without leaves parts out, so that views and view cells can run apart)
+ * --only: parts whose name or family contains TEXT. --without: but not those whose name contains it. --views: of each part
+ * no more than N new ones. --rays: of each view cell.
  * --plant: cull a scene with a planted mistake (1: objects too small, 2: occluders too large),
  * which must be found. --part --view: one view alone, told in full. FOLDER/wrongly-hidden.txt and
  * unconfirmed.txt name objects with their lines.
