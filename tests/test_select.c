@@ -211,46 +211,65 @@ static void close_stand(stand *s)
     umb_scene_destroy(s->scene);
 }
 
-/* The paper's measure of a pick from a point: what it shows along a direction, over the square of its distance. What is
- * right abreast, or edge-on, counts or not. */
-static double shown(const umb_pick *pick, const double eye[3], const double direction[3], bool back, bool counts)
+/* Area vectors of what a pick shows, as seen from a point. */
+typedef struct faces {
+    double areas[64][3], sizes, centre[3]; /* centre: from the eye */
+    bool two_sided[64];
+    uint32_t count;
+} faces;
+
+static void find_faces(const umb_pick *pick, const double eye[3], faces *out)
 {
     bool body = pick->facet == UMB_NONE;
     uint32_t first = body ? 0 : pick->facet, end = body ? pick->facets->facet_count : pick->facet + 1, corners = 0;
-    double centre[3] = {0, 0, 0}, sum = 0.0, areas = 0.0, square = 0.0, ahead = 0.0, facing = 0.0, last[3] = {0, 0, 0};
+    memset(out, 0, sizeof *out);
     for (uint32_t i = first; i < end; ++i) {
         const umb_facet *f = &pick->facets->facets[i];
-        double area[3] = {0, 0, 0}, world[UMB_FACET_CORNERS][3], along = 0.0;
+        double *area = out->areas[out->count], world[UMB_FACET_CORNERS][3], turn = pick->place->mirrored ? -1.0 : 1.0;
         for (uint32_t k = 0; k < f->count; ++k, ++corners) {
             const float *p = pick->facets->positions[pick->facets->corners[f->first + k]];
             for (int x = 0; x < 3; ++x) {
                 const float *row = pick->place->transform.m[x];
                 world[k][x] = pick->place->identity ? p[x] : (double)row[0] * p[0] + (double)row[1] * p[1] + (double)row[2] * p[2] + row[3];
-                centre[x] += world[k][x];
+                out->centre[x] += world[k][x] - eye[x];
             }
         }
         for (uint32_t k = 0; k < f->count; ++k) {
             const double *p = world[k], *q = world[(k + 1) % f->count];
             for (int x = 0; x < 3; ++x) {
-                area[x] += 0.5 * (p[(x + 1) % 3] * q[(x + 2) % 3] - p[(x + 2) % 3] * q[(x + 1) % 3]);
+                area[x] += turn * 0.5 * (p[(x + 1) % 3] * q[(x + 2) % 3] - p[(x + 2) % 3] * q[(x + 1) % 3]);
             }
         }
-        for (int x = 0; x < 3; ++x) {
-            along += area[x] * direction[x] * (pick->place->mirrored ? -1.0 : 1.0);
-        }
-        areas += sqrt(area[0] * area[0] + area[1] * area[1] + area[2] * area[2]);
-        memcpy(last, area, sizeof last);
-        sum += f->two_sided ? fabs(along) : fmax(0.0, back ? along : -along);
+        out->sizes += sqrt(area[0] * area[0] + area[1] * area[1] + area[2] * area[2]);
+        out->two_sided[out->count++] = f->two_sided;
     }
     for (int x = 0; x < 3; ++x) {
-        double off = centre[x] / corners - eye[x];
-        square += off * off;
-        ahead += off * direction[x];
-        facing += off * last[x];
+        out->centre[x] /= corners;
     }
-    bool edge_on = !body && fabs(facing) <= 1e-5 * areas * sqrt(square) && !counts; /* nothing is seen of it from there */
+}
+
+static double dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* The measure of a pick from a point, over the square of its distance. Back: the paper's, what it shows along the direction;
+ * front: what it shows where it stands, less aside. What is right abreast, or edge-on, counts or not. */
+static double shown(const umb_pick *pick, const double eye[3], const double direction[3], bool back, bool counts)
+{
+    faces f;
+    find_faces(pick, eye, &f);
+    double square = dot(f.centre, f.centre), ahead = dot(f.centre, direction), sum = 0.0;
     double least = counts ? -1e-5 : 1e-5, near = counts ? 1.0 + 1e-5 : 1.0 - 1e-5;
-    return !edge_on && (ahead > least * sqrt(square) || square <= near * areas) ? sum / square : 0.0;
+    for (uint32_t i = 0; i < f.count; ++i) {
+        double along = back ? dot(f.areas[i], direction) : -dot(f.areas[i], f.centre) / sqrt(square);
+        sum += f.two_sided[i] ? fabs(along) : fmax(0.0, along);
+    }
+    if (pick->facet != UMB_NONE && !counts && fabs(dot(f.areas[0], f.centre)) <= 1e-5 * f.sizes * sqrt(square)) {
+        return 0.0; /* nothing is seen of it from there */
+    }
+    sum = fmax(0.0, (back ? sum : sum * fmax(0.2, ahead / sqrt(square))) + (counts ? 1e-6 : -1e-6) * f.sizes);
+    return ahead > least * sqrt(square) || square <= near * f.sizes ? sum / square : 0.0;
 }
 
 static void check_list(stand *s, uint32_t leaf, umb_leaf_side side, const double direction[3], uint64_t *entries)

@@ -19,8 +19,8 @@ void umb_chooser_free(umb_chooser *c)
 
 static uint32_t length_for(uint32_t wanted)
 {
-    uint32_t twice = wanted < UMB_CHOOSER_MOST ? 2 * wanted : UMB_CHOOSER_MOST;
-    return twice < UMB_CHOOSER_LEAST ? UMB_CHOOSER_LEAST : twice < UMB_CHOOSER_MOST ? twice : UMB_CHOOSER_MOST;
+    uint32_t length = wanted < UMB_CHOOSER_MOST / 3 ? 3 * wanted : UMB_CHOOSER_MOST;
+    return length < UMB_CHOOSER_LEAST ? UMB_CHOOSER_LEAST : length;
 }
 
 static bool has_lists(const umb_choice *choice)

@@ -6,8 +6,8 @@
 
 #include "leaf_lists.h"
 
-/* Lists are twice as long as what is wanted, and within these. */
-enum { UMB_CHOOSER_LEAST = 128, UMB_CHOOSER_MOST = 512 };
+/* Lists are three times as long as what is wanted, and within these: of what looks large about a third is in view. */
+enum { UMB_CHOOSER_LEAST = 192, UMB_CHOOSER_MOST = 768 };
 
 typedef struct umb_chooser {
     umb_selector selector;

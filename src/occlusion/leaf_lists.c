@@ -1,13 +1,16 @@
 #include "leaf_lists.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "geometry/transform.h"
 
 /* Places that a split looks at. */
 #define SAMPLES 63
+/* The least part of how large it looks that an occluder counts for aside. */
+#define LEAST_AHEAD 0.2
 /* Occluders that are looked at from one point. */
-#define LOOKS 512
+#define LOOKS 768
 /* Places of occluders that a leaf has, about. */
 #define PLACES_EACH 24
 /* Of one occluder so many facets count as places. */
@@ -339,6 +342,29 @@ static void enter(umb_leaf_entry *list, uint16_t *count, uint32_t length, umb_le
     list[at] = e;
 }
 
+/* What is shown of it to whoever looks along v and not quite at it: by how large it looks, less the farther aside it is. What
+ * stands along v, as walls of a corridor do, is seen all the same. */
+static double shown_ahead(const umb_select_look *look, umb_vec3 towards, double ahead)
+{
+    double sum = 0.0;
+    for (uint32_t i = 0; i < look->count; ++i) {
+        double along = umb_vec3_dot(look->areas[i], towards);
+        sum += along < 0.0 || look->two_sided ? fabs(along) : 0.0;
+    }
+    return sum * fmax(ahead, LEAST_AHEAD);
+}
+
+/* What it covers along v, seen from there. */
+static double shown_behind(const umb_select_look *look, umb_vec3 v)
+{
+    double sum = 0.0;
+    for (uint32_t i = 0; i < look->count; ++i) {
+        double along = umb_vec3_dot(look->areas[i], v);
+        sum += along > 0.0 || look->two_sided ? fabs(along) : 0.0;
+    }
+    return sum;
+}
+
 static void enter_everywhere(umb_leaf_lists *l, umb_leaf *leaf, const umb_selector *s, const umb_pick *pick)
 {
     umb_select_look look;
@@ -348,17 +374,14 @@ static void enter_everywhere(umb_leaf_lists *l, umb_leaf *leaf, const umb_select
         sum += umb_vec3_length(look.areas[i]);
     }
     square = square > 1e-30 ? square : 1e-30;
+    umb_vec3 towards = umb_vec3_scale(look.centre, 1.0 / sqrt(square));
     for (uint32_t k = 0; k < UMB_LEAF_DIRECTIONS; ++k) {
         umb_vec3 v = direction_of(k);
-        double shown[2] = {0.0, 0.0};
-        if (!(umb_vec3_dot(look.centre, v) > 0.0) && square > sum) {
+        double ahead = umb_vec3_dot(towards, v);
+        if (!(ahead > 0.0) && square > sum) {
             continue; /* behind, and not all about */
         }
-        for (uint32_t i = 0; i < look.count; ++i) {
-            double along = umb_vec3_dot(look.areas[i], v);
-            shown[UMB_LEAF_FRONT] += along < 0.0 || look.two_sided ? fabs(along) : 0.0;
-            shown[UMB_LEAF_BACK] += along > 0.0 || look.two_sided ? fabs(along) : 0.0;
-        }
+        const double shown[2] = {shown_ahead(&look, towards, ahead), shown_behind(&look, v)};
         for (uint32_t side = 0; side < 2; ++side) {
             float score = (float)(shown[side] / square);
             if (score > 0.0f) {

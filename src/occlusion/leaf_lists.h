@@ -4,9 +4,11 @@
  *     front   what a viewer in the leaf sees the front of: candidates for a frame from there
  *     back    what something in the leaf has its back to: what may hide it from a viewer in that direction
  *
- * ordered by the paper's area-angle, -A (N . V) / |D|^2, the greatest over the points of the leaf that were looked from. Lists
- * only say what is worth trying. They are made point by point, when they are first asked for or ahead, and follow the
- * scene: what comes near makes a leaf look again. */
+ * ordered by area-angle, the greatest over the points of the leaf that were looked from: back by the paper's, A (N . V) / |D|^2
+ * with V the direction of the list; front by -A (N . D) / |D|^3 times the cosine between D and V, for by N . V a wall along
+ * the direction of view counts for nothing, and in corridors such walls hide most. Lists only say what is worth trying. They
+ * are made point by point, when they are first asked for or ahead, and follow the scene: what comes near makes a leaf look
+ * again. */
 #ifndef UMB_LEAF_LISTS_H
 #define UMB_LEAF_LISTS_H
 
