@@ -289,11 +289,12 @@ UMB_INLINE void choose(umb_iv mask, const sums *a, const sums *b, sums *out)
 
 /* T3, with every interval of the pixel: what holds the new one drops it; what it holds goes; what overlaps it in
  * the order that all of the cell agrees on is joined to it. */
-UMB_INLINE umb_iv join(umb_umbra_tile *tiles, uint32_t umbrae, uint32_t at, sums *c, umb_iv here)
+UMB_INLINE umb_iv join(umb_umbra_tile *tiles, uint32_t umbrae, uint32_t at, sums *c, umb_iv here, bool *joined)
 {
     const sums empty = {umb_fv_set(-INFINITY), umb_fv_set(-INFINITY), umb_fv_set(INFINITY),
                         umb_fv_set(INFINITY), umb_fv_set(INFINITY), umb_fv_set(0.0f)};
-    for (uint32_t k = 0; k < umbrae; ++k) {
+    *joined = false;
+    for (uint32_t k = 0; k < umbrae && umb_iv_any(here); ++k) {
         sums old, top, bottom;
         load_interval(&tiles[k], at, &old);
         here &= ~(umb_iv)((old.top >= c->top) & (old.bottom <= c->bottom));
@@ -306,6 +307,7 @@ UMB_INLINE umb_iv join(umb_umbra_tile *tiles, uint32_t umbrae, uint32_t at, sums
         if (!umb_iv_any(inside | meet)) {
             continue;
         }
+        *joined = *joined || umb_iv_any(meet);
         choose((umb_iv)(c->top >= old.top), c, &old, &top);
         choose((umb_iv)(c->bottom <= old.bottom), c, &old, &bottom);
         top.bottom = bottom.bottom;
@@ -325,9 +327,13 @@ UMB_INLINE void keep(umb_umbra_tile *tiles, uint32_t umbrae, uint32_t at, sums *
         sums old, kept;
         load_interval(&tiles[k], at, &old);
         umb_iv wider = here & (umb_iv)(c->top - c->bottom > old.top - old.bottom);
+        if (!umb_iv_any(wider)) {
+            continue;
+        }
         choose(wider, c, &old, &kept);
         choose(wider, &old, c, c);
         store_interval(&tiles[k], at, &kept);
+        here &= (umb_iv)(c->top > -INFINITY); /* nothing is left to keep */
     }
 }
 
@@ -345,9 +351,10 @@ UMB_INLINE void open_ends(sums *c, float steep)
 static void merge_full(umb_umbra_tile *tiles, uint32_t umbrae, uint32_t at, float steep, sums *c, umb_iv here)
 {
     open_ends(c, steep);
-    here = join(tiles, umbrae, at, c, here);
-    if (umbrae > 1 && umb_iv_any(here)) {
-        here = join(tiles, umbrae, at, c, here);
+    bool joined;
+    here = join(tiles, umbrae, at, c, here, &joined);
+    if (umbrae > 1 && joined) { /* what has grown may meet others */
+        here = join(tiles, umbrae, at, c, here, &joined);
     }
     keep(tiles, umbrae, at, c, here);
 }
@@ -432,7 +439,7 @@ static uint64_t open_pixels(const umb_umbra_tile *tiles, uint32_t umbrae, const 
         for (uint32_t j = 0; j < UMB_TILE; j += UMB_LANES) {
             umb_fv lane = lanes_from((float)j);
             umb_iv asked = (umb_iv)((lane >= q->from[r]) & (lane <= q->to[r]));
-            for (uint32_t k = 0; k < umbrae; ++k) {
+            for (uint32_t k = 0; k < umbrae && umb_iv_any(asked); ++k) {
                 const umb_umbra_tile *t = &tiles[k];
                 uint32_t at = r * UMB_TILE + j;
                 asked &= ~(umb_iv)((umb_fv_load(t->top + at) >= top) & (umb_fv_load(t->bottom + at) <= bottom) &
