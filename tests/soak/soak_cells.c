@@ -16,8 +16,8 @@
 
 #define CORNER_COSINE 0.2588190451025207 /* of 75 degrees: umb_region_query.near_depth */
 
-/* Large sets are refined in one cell of sixteen only: else nearly all of the time would go there. */
-enum { MOST_REFINED = 5000, QUICK_EFFORT = 32 };
+/* Large sets are refined with little effort, the largest in one cell of eight only: else nearly all of the time would go there. */
+enum { SMALL_SET = 5000, LARGE_SET = 20000, QUICK_EFFORT = 32 };
 
 enum { WALKED, INSIDE, ACROSS, FLAT, LARGE, BORDER, PLANES, VERTEX, KINDS };
 static const char *const kind_names[KINDS] = {"walked", "inside", "across",    "flat",
@@ -296,9 +296,8 @@ bool soak_judge_cell(const soak_judge *j, umb_region *region, const camera_path 
         return false;
     }
     umb_result result = umb_region_solve(region, &q, &a);
-    bool few = a.pvs_count <= MOST_REFINED;
-    if (result == UMB_OK && (few || number % 16 < 2)) {
-        result = umb_region_refine(region, few ? 0 : QUICK_EFFORT, &a);
+    if (result == UMB_OK && (a.pvs_count <= LARGE_SET || number % 16 < 2)) {
+        result = umb_region_refine(region, a.pvs_count <= SMALL_SET ? 0 : QUICK_EFFORT, &a);
     } else {
         a.refined = a.pvs;
         a.refined_count = a.pvs_count;
