@@ -1,6 +1,7 @@
 /* Leyvand's tables again, and how cost and set size depend on the method's settings: one view cell at a time.
  *
  *   bench_region DATA [--only TEXT] [--rays N] [--effort N|none] [--repeat N] [--most TRIANGLES] [--plots FOLDER]
+ *                     [--log FILE [--seconds N]]
  *
  * DATA is bench/papers/leyvand.csv, which says what is measured. Prints Markdown tables: times are processor time, the least of
  * --repeat (3) answers (of the refinement: of one) on one core, sets in triangles of their objects and in objects. "Seen" is what --rays (2M)
@@ -8,7 +9,8 @@
  * refinement (0, the default: the library's own; none: no refinement). --only: rows whose table or label contains TEXT, or one of several
  * with commas between;
  * --most: leave out larger generated scenes. --plots writes region-TABLE-time.svg and -size.svg for the sweeps.
- * Exit code 1 on a miss. */
+ * --log keeps what is measured, row by row, and takes what is in FILE for measured: a study in pieces, each of which begins no new row after
+ * --seconds. Exit code 1 on a miss, 4 if rows are left. */
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -51,7 +53,8 @@ typedef struct study {
     place places[MOST_PLACES];
     row rows[MOST_ROWS];
     uint32_t place_count, row_count;
-    const char *only, *plots;
+    const char *only, *plots, *log;
+    double started_ms, most_ms; /* when the program began, and how long it may begin new rows */
     uint64_t rays, most;
     uint32_t repeat, effort;
     bool refine;
@@ -373,6 +376,74 @@ static bool measure(study *s, world *w, row *r)
     return true;
 }
 
+/* ---- a study in pieces ---------------------------------------------------------------------------- */
+
+static void name_row(const study *s, const row *r, char *out, size_t size)
+{
+    (void)snprintf(out, size, "%s;%s;%s;%s;%g;%g;%u;%u;%g;%d;%" PRIu64 ";%d;%u", r->table, r->label, r->scene, r->place, r->size,
+                   r->height, r->resolution, r->umbrae, r->outer, r->way, s->rays, s->refine, s->effort);
+}
+
+#define ANSWER_OUT "%.17g %.17g %" PRIu64 " %" PRIu64 " %u %u %u"
+#define ANSWER_IN "%lg %lg %" SCNu64 " %" SCNu64 " %u %u %u"
+
+static bool keep(study *s, const row *r)
+{
+    char name[512];
+    if (s->log == NULL) {
+        return true;
+    }
+    FILE *f = fopen(s->log, "a");
+    if (f == NULL) {
+        (void)snprintf(s->error.text, sizeof s->error.text, "%.200s cannot be written", s->log);
+        return false;
+    }
+    name_row(s, r, name, sizeof name);
+    (void)fprintf(f, "%s|%u %" PRIu64 " %" PRIu64 " %" PRIu64, name, r->seen, r->seen_triangles, r->met, r->rays);
+    for (int k = 0; k < 2; ++k) {
+        const answer *a = k == 0 ? &r->ours : &r->thesis;
+        (void)fprintf(f, " " ANSWER_OUT, a->solve_ms, a->refine_ms, a->pvs_triangles, a->refined_triangles, a->pvs, a->refined,
+                      a->misses);
+    }
+    (void)fprintf(f, "\n");
+    return fclose(f) == 0;
+}
+
+static void take_up(study *s, const char *line)
+{
+    char name[512];
+    for (uint32_t i = 0; i < s->row_count; ++i) {
+        row *r = &s->rows[i];
+        name_row(s, r, name, sizeof name);
+        size_t length = strlen(name);
+        if (strncmp(line, name, length) != 0 || line[length] != '|') {
+            continue;
+        }
+        answer *a = &r->ours, *b = &r->thesis;
+        r->done = sscanf(line + length + 1, "%u %" SCNu64 " %" SCNu64 " %" SCNu64 " " ANSWER_IN " " ANSWER_IN, &r->seen,
+                         &r->seen_triangles, &r->met, &r->rays, &a->solve_ms, &a->refine_ms, &a->pvs_triangles,
+                         &a->refined_triangles, &a->pvs, &a->refined, &a->misses, &b->solve_ms, &b->refine_ms,
+                         &b->pvs_triangles, &b->refined_triangles, &b->pvs, &b->refined, &b->misses) == 18;
+    }
+}
+
+static void read_log(study *s)
+{
+    char line[2048];
+    FILE *f = s->log != NULL ? fopen(s->log, "r") : NULL;
+    while (f != NULL && fgets(line, sizeof line, f) != NULL) {
+        take_up(s, line);
+    }
+    if (f != NULL) {
+        (void)fclose(f);
+    }
+}
+
+static bool is_late(const study *s)
+{
+    return s->most_ms > 0.0 && now_ms() - s->started_ms > s->most_ms;
+}
+
 /* All rows of a scene, one load each. */
 static bool measure_all(study *s)
 {
@@ -382,7 +453,11 @@ static bool measure_all(study *s)
         for (uint32_t k = 0; k < i; ++k) {
             first = first && strcmp(s->rows[k].scene, s->rows[i].scene) != 0;
         }
-        if (!first) {
+        bool left = false;
+        for (uint32_t k = i; k < s->row_count; ++k) {
+            left = left || (strcmp(s->rows[k].scene, s->rows[i].scene) == 0 && !s->rows[k].done);
+        }
+        if (!first || !left || is_late(s)) {
             continue;
         }
         bool ok = world_load(&w, s, s->rows[i].scene), bad = s->error.text[0] != '\0';
@@ -390,7 +465,8 @@ static bool measure_all(study *s)
             (void)fprintf(stderr, "%s: loaded in %.1f s\n", s->rows[i].scene, w.load_s);
         }
         for (uint32_t k = i; ok && k < s->row_count; ++k) {
-            if (strcmp(s->rows[k].scene, s->rows[i].scene) == 0 && !measure(s, &w, &s->rows[k])) {
+            row *r = &s->rows[k];
+            if (strcmp(r->scene, s->rows[i].scene) == 0 && !r->done && !is_late(s) && !(measure(s, &w, r) && keep(s, r))) {
                 ok = false;
                 bad = true;
             }
@@ -553,6 +629,10 @@ static bool read_settings(int count, char **words, study *s)
     for (int i = 2; i + 1 < count; i += 2) {
         if (strcmp(words[i], "--only") == 0) {
             s->only = words[i + 1];
+        } else if (strcmp(words[i], "--log") == 0) {
+            s->log = words[i + 1];
+        } else if (strcmp(words[i], "--seconds") == 0) {
+            s->most_ms = 1e3 * strtod(words[i + 1], NULL);
         } else if (strcmp(words[i], "--plots") == 0) {
             s->plots = words[i + 1];
         } else if (strcmp(words[i], "--rays") == 0) {
@@ -580,14 +660,18 @@ int main(int count, char **words)
                       "bench_region: the head of bench/bench_region.c says how it is used\n");
         return 2;
     }
-    if (!read_data(&s, words[1]) || !measure_all(&s) || !print_all(&s)) {
+    s.started_ms = start;
+    bool ok = read_data(&s, words[1]);
+    read_log(&s);
+    if (!ok || !measure_all(&s) || !print_all(&s)) {
         (void)fprintf(stderr, "bench_region: %s\n", s.error.text);
         return 3;
     }
-    uint32_t missed = 0;
+    uint32_t missed = 0, left = 0;
     for (uint32_t i = 0; i < s.row_count; ++i) {
+        left += !s.rows[i].done;
         missed += s.rows[i].ours.misses + s.rows[i].thesis.misses;
     }
     printf("\n%u misses; the study took %.0f seconds.\n", missed, (now_ms() - start) / 1e3);
-    return missed != 0;
+    return missed != 0 ? 1 : s.log != NULL && left != 0 ? 4 : 0;
 }
