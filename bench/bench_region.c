@@ -460,16 +460,19 @@ static bool measure_all(study *s)
         if (!first || !left || is_late(s)) {
             continue;
         }
+        bool some = false; /* one row at least, or a large scene would be loaded again and again */
         bool ok = world_load(&w, s, s->rows[i].scene), bad = s->error.text[0] != '\0';
         if (ok) {
             (void)fprintf(stderr, "%s: loaded in %.1f s\n", s->rows[i].scene, w.load_s);
         }
         for (uint32_t k = i; ok && k < s->row_count; ++k) {
             row *r = &s->rows[k];
-            if (strcmp(r->scene, s->rows[i].scene) == 0 && !r->done && !is_late(s) && !(measure(s, &w, r) && keep(s, r))) {
-                ok = false;
-                bad = true;
+            if (strcmp(r->scene, s->rows[i].scene) != 0 || r->done || (some && is_late(s))) {
+                continue;
             }
+            some = true;
+            ok = measure(s, &w, r) && keep(s, r);
+            bad = !ok;
         }
         world_free(&w);
         if (bad) {
