@@ -9,8 +9,8 @@
  * refinement (0, the default: the library's own; none: no refinement). --only: rows whose table or label contains TEXT, or one of several
  * with commas between;
  * --most: leave out larger generated scenes. --plots writes region-TABLE-time.svg and -size.svg for the sweeps.
- * --log keeps what is measured, row by row, and takes what is in FILE for measured: a study in pieces, each of which begins no new row after
- * --seconds. Exit code 1 on a miss, 4 if rows are left. */
+ * --log keeps what is measured, row by row, and takes what is in FILE for measured (of a row the last): a study in pieces, each of which
+ * begins no new row after --seconds; 0: print what is there. Exit code 1 on a miss, 4 if rows are left. */
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -378,10 +378,10 @@ static bool measure(study *s, world *w, row *r)
 
 /* ---- a study in pieces ---------------------------------------------------------------------------- */
 
-static void name_row(const study *s, const row *r, char *out, size_t size)
+static void name_row(const row *r, char *out, size_t size)
 {
-    (void)snprintf(out, size, "%s;%s;%s;%s;%g;%g;%u;%u;%g;%d;%" PRIu64 ";%d;%u", r->table, r->label, r->scene, r->place, r->size,
-                   r->height, r->resolution, r->umbrae, r->outer, r->way, s->rays, s->refine, s->effort);
+    (void)snprintf(out, size, "%s;%s;%s;%s;%g;%g;%u;%u;%g;%d", r->table, r->label, r->scene, r->place, r->size,
+                   r->height, r->resolution, r->umbrae, r->outer, r->way);
 }
 
 #define ANSWER_OUT "%.17g %.17g %" PRIu64 " %" PRIu64 " %u %u %u"
@@ -398,7 +398,7 @@ static bool keep(study *s, const row *r)
         (void)snprintf(s->error.text, sizeof s->error.text, "%.200s cannot be written", s->log);
         return false;
     }
-    name_row(s, r, name, sizeof name);
+    name_row(r, name, sizeof name);
     (void)fprintf(f, "%s|%u %" PRIu64 " %" PRIu64 " %" PRIu64, name, r->seen, r->seen_triangles, r->met, r->rays);
     for (int k = 0; k < 2; ++k) {
         const answer *a = k == 0 ? &r->ours : &r->thesis;
@@ -414,7 +414,7 @@ static void take_up(study *s, const char *line)
     char name[512];
     for (uint32_t i = 0; i < s->row_count; ++i) {
         row *r = &s->rows[i];
-        name_row(s, r, name, sizeof name);
+        name_row(r, name, sizeof name);
         size_t length = strlen(name);
         if (strncmp(line, name, length) != 0 || line[length] != '|') {
             continue;
@@ -441,7 +441,7 @@ static void read_log(study *s)
 
 static bool is_late(const study *s)
 {
-    return s->most_ms > 0.0 && now_ms() - s->started_ms > s->most_ms;
+    return now_ms() - s->started_ms >= s->most_ms;
 }
 
 /* All rows of a scene, one load each. */
@@ -489,27 +489,43 @@ static double over(double a, double b)
     return b > 0.0 ? a / b : NAN;
 }
 
+/* What rays say, where there were any. */
+typedef struct said {
+    char seen[24], met[24], ratio[24];
+} said;
+
+static said said_of(const row *r, uint64_t refined, uint64_t seen)
+{
+    said t = {"-", "-", "-"};
+    if (r->rays != 0) {
+        (void)snprintf(t.seen, sizeof t.seen, "%" PRIu64, seen);
+        (void)snprintf(t.met, sizeof t.met, "%" PRIu64, r->met);
+        (void)snprintf(t.ratio, sizeof t.ratio, "%.2f", over((double)refined, (double)seen));
+    }
+    return t;
+}
+
 static void print_thesis_row(const row *r)
 {
     double pvs = strtod(r->theirs[1], NULL), vs = strtod(r->theirs[2], NULL);
-    printf("| %s | %s | %s | %s | %.2f | %.1f | %" PRIu64 " | %.1f | %.1f | %" PRIu64 " | %" PRIu64
-           " | %" PRIu64 " | %" PRIu64 " | %.2f | %.2f | %u |\n",
+    said t = said_of(r, r->ours.refined_triangles, r->seen_triangles);
+    printf("| %s | %s | %s | %s | %.2f | %.0f | %" PRIu64 " | %.1f | %.0f | %" PRIu64 " | %" PRIu64
+           " | %s | %s | %.2f | %s | %u |\n",
            r->label, r->theirs[0], r->theirs[1], r->theirs[2], over(pvs, vs), r->thesis.solve_ms,
            r->thesis.pvs_triangles, r->ours.solve_ms, r->ours.refine_ms, r->ours.pvs_triangles,
-           r->ours.refined_triangles, r->seen_triangles, r->met,
-           over((double)r->ours.pvs_triangles, (double)r->ours.refined_triangles),
-           over((double)r->ours.refined_triangles, (double)r->seen_triangles),
+           r->ours.refined_triangles, t.seen, t.met,
+           over((double)r->ours.pvs_triangles, (double)r->ours.refined_triangles), t.ratio,
            r->ours.misses + r->thesis.misses);
 }
 
 static void print_row(const row *r)
 {
-    printf("| %s | %.1f | %.1f | %u | %u | %u | %" PRIu64 " | %" PRIu64 " | %" PRIu64
-           " | %.2f | %.2f | %u |\n",
-           r->label, r->ours.solve_ms, r->ours.refine_ms, r->ours.pvs, r->ours.refined, r->seen,
-           r->ours.pvs_triangles, r->ours.refined_triangles, r->seen_triangles,
-           over(r->ours.pvs, r->ours.refined), over(r->ours.refined, r->seen),
-           r->ours.misses + r->thesis.misses);
+    said objects = said_of(r, r->ours.refined, r->seen);
+    said triangles = said_of(r, r->ours.refined_triangles, r->seen_triangles);
+    printf("| %s | %.1f | %.0f | %u | %u | %s | %" PRIu64 " | %" PRIu64 " | %s | %.2f | %s | %u |\n",
+           r->label, r->ours.solve_ms, r->ours.refine_ms, r->ours.pvs, r->ours.refined, objects.seen,
+           r->ours.pvs_triangles, r->ours.refined_triangles, triangles.seen,
+           over(r->ours.pvs, r->ours.refined), objects.ratio, r->ours.misses + r->thesis.misses);
 }
 
 /* Without refinement and rays. */
@@ -628,6 +644,7 @@ static bool read_settings(int count, char **words, study *s)
 {
     s->rays = 2000000;
     s->repeat = 3;
+    s->most_ms = INFINITY;
     s->refine = true;
     for (int i = 2; i + 1 < count; i += 2) {
         if (strcmp(words[i], "--only") == 0) {

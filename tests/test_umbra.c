@@ -12,6 +12,7 @@
 
 #include "bake/ray_far.h"
 #include "bake/ray_map.h"
+#include "bake/beam.h"
 #include "bake/region_state.h"
 #include "support/failing.h"
 
@@ -153,6 +154,9 @@ static void test_corners(void **state)
         umb_box_corners(min[0], max[0], corners[0]);
         umb_box_corners(min[1], max[1], corners[1]);
         uint64_t blocked = umb_solid_blocks(&solids, &body, (const double(*)[3])corners[0], (const double(*)[3])corners[1]);
+        for (int c = 0; c < 64; ++c) {
+            assert_int_equal(blocked >> c & 1, umb_solid_meets(&solids, &body, corners[0][c / 8], corners[1][c % 8]));
+        }
         if (blocked != UINT64_MAX) {
             continue;
         }
@@ -171,6 +175,70 @@ static void test_corners(void **state)
         }
     }
     assert_true(all > rounds / 100);
+}
+
+static void draw_box(dice *d, double reach, double size, float min[3], float max[3])
+{
+    for (int k = 0; k < 3; ++k) {
+        min[k] = (float)between(d, -reach, reach);
+        max[k] = min[k] + (float)between(d, 0, size);
+    }
+}
+
+static umb_shaft draw_shaft(dice *d, double min[2][3], double max[2][3])
+{
+    umb_shaft shaft;
+    for (int e = 0; e < 2; ++e) {
+        float low[3], high[3];
+        draw_box(d, 20, dice_roll(d, 4) == 0 ? 0.0 : 5.0, low, high);
+        for (int k = 0; k < 3; ++k) {
+            min[e][k] = low[k];
+            max[e][k] = high[k];
+        }
+    }
+    umb_shaft_make(&shaft, (const double(*)[3])min, (const double(*)[3])max);
+    return shaft;
+}
+
+/* What a segment between two boxes meets is not beside their shaft, and the tree finds it. */
+static void test_shafts(void **state)
+{
+    (void)state;
+    enum { BODIES = 300 };
+    umb_allocator a = umb_memory_allocator(NULL);
+    dice d = {14};
+    static umb_solid bodies[BODIES];
+    umb_solids solids = {.allocator = &a, .items = bodies, .count = BODIES};
+    umb_solid_tree tree = {0};
+    uint32_t met = 0, found[BODIES], some[40];
+    for (uint32_t i = 0; i < BODIES; ++i) {
+        draw_box(&d, 20, 12, bodies[i].bounds.min, bodies[i].bounds.max);
+    }
+    assert_true(umb_solid_tree_build(&tree, &a, &solids));
+    for (uint32_t n = 0; n < (is_small() ? 200u : 2000u); ++n) {
+        double min[2][3], max[2][3], at[3], t = between(&d, 0, 1);
+        umb_shaft shaft = draw_shaft(&d, min, max);
+        uint32_t count = umb_solid_tree_find(&tree, &solids, &shaft, BODIES, found), next = 0;
+        for (int k = 0; k < 3; ++k) {
+            at[k] = (1 - t) * between(&d, min[0][k], max[0][k]) + t * between(&d, min[1][k], max[1][k]);
+        }
+        for (uint32_t i = 0; i < BODIES; ++i) {
+            const umb_aabb *b = &bodies[i].bounds;
+            bool beside = umb_shaft_beside(&shaft, b), inside = true;
+            for (int k = 0; k < 3; ++k) {
+                inside = inside && at[k] > b->min[k] + 1e-4 && at[k] < b->max[k] - 1e-4;
+            }
+            met += inside;
+            assert_false(inside && beside);
+            assert_int_equal(next < count && found[next] == i, !beside);
+            next += beside ? 0 : 1;
+        }
+        uint32_t few = umb_solid_tree_find(&tree, &solids, &shaft, 40, some);
+        assert_int_equal(few, count < 40 ? count : 40);
+        assert_memory_equal(some, found, few * sizeof *some);
+    }
+    assert_true(met > 10);
+    umb_solid_tree_free(&tree, &a);
 }
 
 /* ---- rays --------------------------------------------------------------------------------------- */
@@ -341,6 +409,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_slices),  cmocka_unit_test(test_joins), cmocka_unit_test(test_corners),
+        cmocka_unit_test(test_shafts),
         cmocka_unit_test(test_rays),
         cmocka_unit_test(test_far),    cmocka_unit_test(test_kernels),
     };
