@@ -374,6 +374,18 @@ static void live_on(world *w, uint32_t frame, bool exchange)
     assert_int_equal(umb_scene_commit(w->scene), UMB_OK);
 }
 
+/* What all answer in the middle of motion. */
+static void check_all(world *w, uint32_t rays)
+{
+    static uint8_t found[MOST];
+    umb_view v = random_view(&w->seed, REACH);
+    by_box(w->scene, &v, found);
+    for (uint32_t i = 0; i < w->count; ++i) {
+        check_frustum(&w->all[i], &v, found);
+    }
+    (void)check_occlusion(w, rays, 0);
+}
+
 /* Thousands of frames. Where things only move and boxes are refitted, or trees built anew beside, nothing is allocated after
  * the first ones. Where things come and go, by all ways, room is made for the largest tree that was ever needed. */
 static void test_steady_memory(void **state)
@@ -400,6 +412,9 @@ static void test_steady_memory(void **state)
             if (frame == frames / 3) {
                 left = atomic_load(&memory.left);
                 held = atomic_load(&memory.held);
+            }
+            if (frame % 300 == 299) {
+                check_all(&w, frame % 3000 == 2999 ? 20000 : 200);
             }
         }
         printf("# %u frames, %s: %lld allocations in the last two thirds, %lld bytes held, %lld at the end\n", frames,
