@@ -13,9 +13,11 @@
 
 /* Cells with pieces of no more items are leaves. */
 #define LEAF_ITEMS 4
-/* How many planes are tried, and on how many of a cell's pieces. */
+/* How many planes are tried, fewer in cells of few pieces, which are most cells; and on how many of a cell's pieces. */
 #define TRIES 12
-#define SAMPLE 2048
+#define FEW_TRIES 5
+#define FEW_PIECES 64
+#define SAMPLE 256
 /* A cut costs as much as a difference of so many pieces between the halves (Abrash). */
 #define CUT_COST 8.0
 /* The pieces that there may be beyond those at first, in units of their count; each cell has a share. */
@@ -39,6 +41,16 @@ typedef struct cell {
     uint64_t extra;
 } cell;
 
+static inline float lower(float a, float b)
+{
+    return a < b ? a : b;
+}
+
+static inline float higher(float a, float b)
+{
+    return a > b ? a : b;
+}
+
 /* ---- pieces --------------------------------------------------------------------------------- */
 
 static bool reserve_pieces(bsp *b, size_t count)
@@ -56,8 +68,8 @@ static umb_aabb box_of_triangle(const umb_bsp_shape *t)
 {
     umb_aabb box;
     for (int i = 0; i < 3; ++i) {
-        box.min[i] = fminf(t->corners[0][i], fminf(t->corners[1][i], t->corners[2][i]));
-        box.max[i] = fmaxf(t->corners[0][i], fmaxf(t->corners[1][i], t->corners[2][i]));
+        box.min[i] = lower(t->corners[0][i], lower(t->corners[1][i], t->corners[2][i]));
+        box.max[i] = higher(t->corners[0][i], higher(t->corners[1][i], t->corners[2][i]));
     }
     return box;
 }
@@ -140,8 +152,8 @@ static uint32_t add_leaf(bsp *b, umb_cell_run run)
         const umb_bsp_piece *piece = &pieces[(uint32_t)sorted[i]];
         if (piece->ref == part.ref) {
             for (int k = 0; k < 3; ++k) {
-                part.min[k] = fminf(part.min[k], piece->box.min[k]);
-                part.max[k] = fmaxf(part.max[k], piece->box.max[k]);
+                part.min[k] = lower(part.min[k], piece->box.min[k]);
+                part.max[k] = higher(part.max[k], piece->box.max[k]);
             }
             continue;
         }
@@ -197,7 +209,8 @@ static umb_bsp_plane plane_of(const bsp *b, const umb_bsp_piece *piece, uint32_t
         return umb_bsp_piece_plane(&b->pool, piece->triangle);
     }
     int axis = (int)(dice % 3);
-    return (umb_bsp_plane){axis, (dice / 3) % 2 == 0 ? piece->box.min[axis] : piece->box.max[axis], UMB_NONE};
+    float at = (dice / 3) % 2 == 0 ? piece->box.min[axis] : piece->box.max[axis];
+    return (umb_bsp_plane){.axis = axis, .at = at, .triangle = UMB_NONE};
 }
 
 static double size_of(const bsp *b, const umb_bsp_piece *piece)
@@ -218,17 +231,22 @@ static double size_of(const bsp *b, const umb_bsp_piece *piece)
     return 0.5 * sqrt(sum);
 }
 
+static uint32_t tries_of(const cell *c)
+{
+    return c->run.count < FEW_PIECES ? FEW_TRIES : TRIES;
+}
+
 /* Large ones first: they are cut least if their planes come first. */
 static uint32_t find_largest(const bsp *b, const cell *c, uint32_t out[TRIES])
 {
     double size[TRIES];
-    uint32_t n = 0;
+    uint32_t n = 0, most = tries_of(c);
     for (uint32_t i = 0; i < c->run.count; ++i) {
         double own = size_of(b, &b->stack[c->run.first + i]);
-        if (n == TRIES && !(own > size[n - 1])) {
+        if (n == most && !(own > size[n - 1])) {
             continue;
         }
-        uint32_t at = n < TRIES ? n++ : n - 1;
+        uint32_t at = n < most ? n++ : n - 1;
         for (; at > 0 && size[at - 1] < own; --at) {
             size[at] = size[at - 1];
             out[at] = out[at - 1];
@@ -241,10 +259,10 @@ static uint32_t find_largest(const bsp *b, const cell *c, uint32_t out[TRIES])
 
 static uint32_t find_random(const cell *c, uint32_t out[TRIES])
 {
-    for (uint32_t k = 0; k < TRIES; ++k) {
+    for (uint32_t k = 0; k < tries_of(c); ++k) {
         out[k] = scramble(c->depth * TRIES + k + scramble(c->run.count)) % c->run.count;
     }
-    return TRIES;
+    return tries_of(c);
 }
 
 /* What a plane does to a cell's pieces. */
@@ -256,8 +274,8 @@ typedef struct division {
 static void grow(umb_aabb *box, const umb_aabb *by)
 {
     for (int i = 0; i < 3; ++i) {
-        box->min[i] = fminf(box->min[i], by->min[i]);
-        box->max[i] = fmaxf(box->max[i], by->max[i]);
+        box->min[i] = lower(box->min[i], by->min[i]);
+        box->max[i] = higher(box->max[i], by->max[i]);
     }
 }
 
@@ -267,7 +285,7 @@ static division divide(const bsp *b, const cell *c, const umb_bsp_plane *p, uint
     division d = {.box = {nothing, nothing}};
     for (uint32_t i = 0; i < c->run.count; i += step) {
         const umb_bsp_piece *piece = &b->stack[c->run.first + i];
-        uint32_t sides = umb_bsp_piece_sides(&b->pool, piece, p);
+        uint32_t sides = umb_bsp_piece_sides_about(&b->pool, piece, p);
         d.below += sides == UMB_BSP_BELOW;
         d.above += sides == UMB_BSP_ABOVE;
         d.both += sides == (UMB_BSP_BELOW | UMB_BSP_ABOVE);

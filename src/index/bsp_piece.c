@@ -20,10 +20,17 @@ umb_bsp_plane umb_bsp_piece_plane(const umb_bsp_pool *pool, uint32_t triangle)
     const float(*c)[3] = pool->triangles[triangle].corners;
     for (int axis = 0; axis < 3; ++axis) {
         if (c[0][axis] == c[1][axis] && c[0][axis] == c[2][axis]) {
-            return (umb_bsp_plane){axis, c[0][axis], triangle};
+            return (umb_bsp_plane){.axis = axis, .at = c[0][axis], .triangle = triangle};
         }
     }
-    return (umb_bsp_plane){(int)UMB_ORDER_TILTED, 0.0f, triangle};
+    umb_bsp_plane p = {.axis = (int)UMB_ORDER_TILTED, .triangle = triangle};
+    umb_vec3 a = umb_vec3_from_float(c[0]);
+    umb_vec3 u = umb_vec3_sub(umb_vec3_from_float(c[1]), a), v = umb_vec3_sub(umb_vec3_from_float(c[2]), a);
+    umb_vec3 n = umb_vec3_cross(u, v);
+    memcpy(p.from, &a, sizeof p.from);
+    memcpy(p.normal, &n, sizeof p.normal);
+    p.span = umb_vec3_sum_abs(u) * umb_vec3_sum_abs(v);
+    return p;
 }
 
 /* ---- sides ---------------------------------------------------------------------------------- */
@@ -33,25 +40,52 @@ static uint32_t side_of_sign(int sign)
     return sign > 0 ? UMB_BSP_ABOVE : sign < 0 ? UMB_BSP_BELOW : 0;
 }
 
-static uint32_t side_of_corner(const umb_bsp_pool *pool, const umb_bsp_plane *p, const float corner[3])
+/* By the height over a tilted plane, in units of its normal. Differences, products and sums make it off by no more than 16 units
+ * of span and distance, as in geometry/side.c: beyond that the sign is certain. */
+static uint32_t side_of_corner(const umb_bsp_pool *pool, const umb_bsp_plane *p, const float corner[3], bool exactly)
 {
     if (p->axis != (int)UMB_ORDER_TILTED) {
         return side_of_sign((corner[p->axis] > p->at) - (corner[p->axis] < p->at));
     }
+    double height = 0.0, reach = 0.0;
+    for (int i = 0; i < 3; ++i) {
+        double d = corner[i] - p->from[i];
+        height += p->normal[i] * d;
+        reach += fabs(d);
+    }
+    if (fabs(height) > 16.0 * U * p->span * reach) {
+        return height > 0.0 ? UMB_BSP_ABOVE : UMB_BSP_BELOW;
+    }
     const float(*t)[3] = pool->triangles[p->triangle].corners;
-    return side_of_sign(umb_orient(t[0], t[1], t[2], corner));
+    return exactly ? side_of_sign(umb_orient(t[0], t[1], t[2], corner)) : 0;
 }
 
-static uint32_t sides_of_box(const umb_bsp_pool *pool, const umb_bsp_plane *p, const umb_aabb *box)
+/* Where a box surely lies that is on one side of a tilted plane; both if that is not certain. The highest and the lowest corner
+ * are those that the normal as computed says: a component of it that has the wrong sign is smaller than its error, 4 units of
+ * span, and the bound has room for that times the distance of the farthest corner. */
+static uint32_t side_of_whole_box(const umb_bsp_plane *p, const umb_aabb *box)
+{
+    double low = 0.0, high = 0.0, reach = 0.0;
+    for (int i = 0; i < 3; ++i) {
+        double from = box->min[i] - p->from[i], to = box->max[i] - p->from[i], a = p->normal[i] * from, b = p->normal[i] * to;
+        low += a < b ? a : b;
+        high += a < b ? b : a;
+        reach += fabs(from) > fabs(to) ? fabs(from) : fabs(to);
+    }
+    double off = 16.0 * U * p->span * reach;
+    return low > off ? UMB_BSP_ABOVE : high < -off ? UMB_BSP_BELOW : UMB_BSP_BELOW | UMB_BSP_ABOVE;
+}
+
+static uint32_t sides_of_box(const umb_bsp_pool *pool, const umb_bsp_plane *p, const umb_aabb *box, bool exactly)
 {
     if (p->axis != (int)UMB_ORDER_TILTED) {
-        return side_of_corner(pool, p, box->min) | side_of_corner(pool, p, box->max);
+        return side_of_corner(pool, p, box->min, exactly) | side_of_corner(pool, p, box->max, exactly);
     }
     uint32_t sides = 0;
     for (int k = 0; k < 8 && sides != (UMB_BSP_BELOW | UMB_BSP_ABOVE); ++k) {
         const float corner[3] = {k & 1 ? box->max[0] : box->min[0], k & 2 ? box->max[1] : box->min[1],
                                  k & 4 ? box->max[2] : box->min[2]};
-        sides |= side_of_corner(pool, p, corner);
+        sides |= side_of_corner(pool, p, corner, exactly);
     }
     return sides;
 }
@@ -88,29 +122,51 @@ static void find_heights(const umb_bsp_pool *pool, const umb_bsp_plane *p, const
     h->off += 3.0 * span * o->off;
 }
 
-uint32_t umb_bsp_piece_sides(const umb_bsp_pool *pool, const umb_bsp_piece *piece, const umb_bsp_plane *plane)
+static uint32_t sides_of_outline(const umb_bsp_pool *pool, const umb_bsp_plane *plane, const umb_bsp_outline *o)
 {
-    if (piece->triangle == UMB_NONE) {
-        return sides_of_box(pool, plane, &piece->box);
-    }
-    uint32_t sides = 0;
-    for (int k = 0; k < 3; ++k) {
-        sides |= side_of_corner(pool, plane, pool->triangles[piece->triangle].corners[k]);
-    }
-    if (sides == (UMB_BSP_BELOW | UMB_BSP_ABOVE)) { /* the box may have been cut by planes across axes */
-        sides &= sides_of_box(pool, plane, &piece->box);
-    }
-    if (piece->outline == UMB_NONE || sides != (UMB_BSP_BELOW | UMB_BSP_ABOVE)) {
-        return sides;
-    }
     heights h;
-    find_heights(pool, plane, &pool->outlines[piece->outline], &h);
+    find_heights(pool, plane, o, &h);
     bool below = false, above = false;
-    for (uint32_t k = 0; k < pool->outlines[piece->outline].count; ++k) {
+    for (uint32_t k = 0; k < o->count; ++k) {
         below = below || h.at[k] < h.off;
         above = above || h.at[k] > -h.off;
     }
     return (below ? UMB_BSP_BELOW : 0u) | (above ? UMB_BSP_ABOVE : 0u);
+}
+
+static uint32_t find_sides(const umb_bsp_pool *pool, const umb_bsp_piece *piece, const umb_bsp_plane *plane, bool exactly)
+{
+    uint32_t sides = 0;
+    if (plane->axis == (int)UMB_ORDER_TILTED) {
+        sides = side_of_whole_box(plane, &piece->box);
+        if (sides != (UMB_BSP_BELOW | UMB_BSP_ABOVE)) {
+            return sides;
+        }
+    }
+    if (piece->triangle == UMB_NONE) {
+        return sides_of_box(pool, plane, &piece->box, exactly);
+    }
+    sides = 0;
+    for (int k = 0; k < 3; ++k) {
+        sides |= side_of_corner(pool, plane, pool->triangles[piece->triangle].corners[k], exactly);
+    }
+    if (sides == (UMB_BSP_BELOW | UMB_BSP_ABOVE)) { /* the box may have been cut by planes across axes */
+        sides &= sides_of_box(pool, plane, &piece->box, exactly);
+    }
+    if (piece->outline == UMB_NONE || sides != (UMB_BSP_BELOW | UMB_BSP_ABOVE)) {
+        return sides;
+    }
+    return sides_of_outline(pool, plane, &pool->outlines[piece->outline]);
+}
+
+uint32_t umb_bsp_piece_sides(const umb_bsp_pool *pool, const umb_bsp_piece *piece, const umb_bsp_plane *plane)
+{
+    return find_sides(pool, piece, plane, true);
+}
+
+uint32_t umb_bsp_piece_sides_about(const umb_bsp_pool *pool, const umb_bsp_piece *piece, const umb_bsp_plane *plane)
+{
+    return find_sides(pool, piece, plane, false);
 }
 
 /* ---- cutting -------------------------------------------------------------------------------- */

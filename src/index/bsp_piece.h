@@ -39,13 +39,16 @@ typedef struct umb_bsp_pool {
 typedef struct umb_bsp_plane {
     int axis; /* 0 .. 2, UMB_ORDER_TILTED */
     float at;
-    uint32_t triangle; /* tilted */
+    uint32_t triangle; /* tilted: a corner of it, its normal, and what bounds the normal's components and their errors */
+    double from[3], normal[3], span;
 } umb_bsp_plane;
 
 /* Where a piece lies, as bits; neither: in the plane. Exact for whole triangles and for boxes. Of a piece that
  * has been cut it may say both where only one is true, never one where both are. */
 enum { UMB_BSP_BELOW = 1, UMB_BSP_ABOVE = 2 };
 uint32_t umb_bsp_piece_sides(const umb_bsp_pool *pool, const umb_bsp_piece *piece, const umb_bsp_plane *plane);
+/* The same in a hurry, to compare planes by: what is so near to the plane that rounding decides counts as in it. */
+uint32_t umb_bsp_piece_sides_about(const umb_bsp_pool *pool, const umb_bsp_piece *piece, const umb_bsp_plane *plane);
 
 /* The part of a piece on one side of a plane that it reaches to both sides of. cut: triangles are cut, too, else only
  * boxes are, by planes across an axis. false: no memory. */
