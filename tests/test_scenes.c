@@ -1,9 +1,7 @@
 /* Nothing that can be seen is hidden, on the real scenes of UMBRAGE_SCENES; and levels are really
  * culled.
  *
- * test_scenes [PART PARTS]: takes every PARTS-th scene from PART on, so that parts run side by
- * side. A third argument takes only the scenes whose name contains it. UMBRAGE_TEST_SIZE chooses
- * the views. */
+ * test_scenes [PART PARTS [NAME]]: as scene_tests_arguments() takes them. UMBRAGE_TEST_SIZE chooses the views. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -12,7 +10,7 @@
 
 #include <cmocka.h>
 
-#include "support/real_scenes.h"
+#include "support/scene_tests.h"
 #include "support/strict.h"
 
 #define MAX_RASTERS 3
@@ -36,9 +34,6 @@ static const effort NORMAL = {
 static const effort FULL = {1,  1,
                             10, {{256, 144}, {1024, 288}, {2048, 576}},
                             3,  {.grid_width = 384, .grid_height = 192, .guided_rays = 1000000}};
-
-static uint32_t part, parts = 1;
-static const char *only = "";
 
 /* One scene with everything that looks at it. */
 typedef struct stand {
@@ -143,11 +138,6 @@ static void check_row(stand *s, uint32_t row, bool ortho, strict_count *sums)
     assert_true(strict_check_all(s->oracle, s->model, &view, answers, answer_count(s), &s->effort->oracle));
 }
 
-static double mean(uint64_t sum, uint64_t count)
-{
-    return count != 0 ? (double)sum / (double)count : 0.0;
-}
-
 static void say(const stand *s, uint32_t answer, const char *views, const strict_count *c)
 {
     char title[32];
@@ -155,16 +145,18 @@ static void say(const stand *s, uint32_t answer, const char *views, const strict
            "wrong %llu "
            "unconfirmed %llu conservativity %.3f\n",
            s->scene->name, title_of(s, answer, title), views, (unsigned long long)c->views,
-           mean(c->in_frustum, c->views), mean(c->reported, c->views),
-           mean(c->truth_visible, c->views), (unsigned long long)c->wrongly_hidden,
-           (unsigned long long)c->unconfirmed, mean(c->reported, c->truth_visible));
+           scene_tests_mean(c->in_frustum, c->views), scene_tests_mean(c->reported, c->views),
+           scene_tests_mean(c->truth_visible, c->views), (unsigned long long)c->wrongly_hidden,
+           (unsigned long long)c->unconfirmed, scene_tests_mean(c->reported, c->truth_visible));
     (void)fflush(stdout);
 }
 
 /* Returns how many objects were wrongly hidden, plus one for each level that is not really
  * culled. */
-static uint64_t check_scene(const real_scene *scene, const effort *e)
+static uint64_t check_scene(const real_scene *scene)
 {
+    effort wanted;
+    const effort *e = effort_wanted(&wanted);
     stand s = {.scene = scene, .effort = e};
     set_up(&s);
     for (uint32_t row = 0; row < s.path.count; ++row) {
@@ -200,38 +192,12 @@ static uint64_t check_scene(const real_scene *scene, const effort *e)
 static void test_real_scenes(void **state)
 {
     (void)state;
-    const char *folder = getenv("UMBRAGE_SCENES");
-    if (folder == NULL || folder[0] == '\0') {
-        print_message("skipped: UMBRAGE_SCENES names no folder of real scenes\n");
-        skip();
-    }
-    real_scenes all;
-    umb_error error = {0};
-    effort e;
-    (void)effort_wanted(&e);
-    if (!real_scenes_find(folder, &all, &error)) {
-        fail_msg("%s", error.text);
-    }
-    assert_true(all.count > 0);
-    uint64_t bad = 0;
-    for (uint32_t i = 0; i < all.count; ++i) {
-        if (i % parts == part && strstr(all.scenes[i].name, only) != NULL) {
-            bad += check_scene(&all.scenes[i], &e);
-        }
-    }
-    real_scenes_free(&all);
-    assert_int_equal(bad, 0);
+    scene_tests_run(check_scene);
 }
 
 int main(int argc, char **argv)
 {
-    if (argc > 2) {
-        part = (uint32_t)atoi(argv[1]);
-        parts = atoi(argv[2]) > 0 ? (uint32_t)atoi(argv[2]) : 1;
-    }
-    if (argc > 3) {
-        only = argv[3];
-    }
+    scene_tests_arguments(argc, argv);
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_real_scenes)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

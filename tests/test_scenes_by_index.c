@@ -2,7 +2,7 @@
  * with the same flags, but for what surely is beside it where indices know parts of objects; and the raster, over every
  * one of them, hides nothing that the oracle sees.
  *
- * test_scenes_by_index [PART PARTS [NAME]]: takes every PARTS-th scene from PART on, of those whose name contains NAME.
+ * test_scenes_by_index [PART PARTS [NAME]]: as scene_tests_arguments() takes them.
  * UMBRAGE_TEST_SIZE chooses the views, UMBRAGE_SCENES_STEP of the walked ones every so manyth. */
 #include <setjmp.h>
 #include <stdarg.h>
@@ -14,23 +14,22 @@
 
 #include "frustum/box_kernels.h"
 #include "support/box_meets.h"
-#include "support/real_scenes.h"
+#include "support/scene_tests.h"
 #include "support/strict.h"
 
 enum { MOST = 64 };
 
 typedef struct effort {
     uint32_t walk_step, nasty_step;
-    uint32_t most_triangles; /* of scenes for BSP trees, which hold each triangle: a million take minutes to build */
+    /* Of scenes for all BSP trees, and for one, which hold each triangle: a million take ten seconds to build. */
+    uint32_t most_triangles, most_for_one;
+    uint32_t share; /* a view is asked of one index in so many, each time others */
     truth_options oracle;
 } effort;
 
-static const effort SMALL = {479, 19, 30000, {.grid_width = 96, .grid_height = 48, .guided_rays = 10000}};
-static const effort NORMAL = {160, 10, 100000, {.grid_width = 192, .grid_height = 96, .guided_rays = 40000}};
-static const effort FULL = {8, 1, 200000, {.grid_width = 384, .grid_height = 192, .guided_rays = 250000}};
-
-static uint32_t part, parts = 1;
-static const char *only = "";
+static const effort SMALL = {479, 19, 30000, 30000, 1, {.grid_width = 96, .grid_height = 48, .guided_rays = 10000}};
+static const effort NORMAL = {160, 10, 100000, 2000000, 2, {.grid_width = 192, .grid_height = 96, .guided_rays = 40000}};
+static const effort FULL = {8, 1, 2000000, 2000000, 1, {.grid_width = 384, .grid_height = 192, .guided_rays = 250000}};
 
 typedef struct crew {
     const char *name;
@@ -47,6 +46,7 @@ typedef struct stand {
     umb_scene *built;
     truth *oracle;
     camera_path path;
+    uint32_t rows; /* looked at */
     crew flat, crews[MOST];
     uint32_t count;
 } stand;
@@ -82,7 +82,8 @@ static void set_up(stand *s)
     make_crew(s, "flat", &s->flat);
     const char *name;
     for (uint32_t k = 0; (name = umb_index_variant(k)) != NULL; ++k) {
-        if (strncmp(name, "bsp", 3) != 0 || s->model->triangles <= s->effort->most_triangles) {
+        uint32_t most = strcmp(name, "bsp") == 0 ? s->effort->most_for_one : s->effort->most_triangles;
+        if (strncmp(name, "bsp", 3) != 0 || s->model->triangles <= most) {
             assert_true(s->count < MOST);
             make_crew(s, name, &s->crews[s->count++]);
         }
@@ -142,7 +143,7 @@ static void check_row(stand *s, uint32_t row)
     uint32_t *ids[2 * MOST], n = 0;
     assert_true(real_scene_view(s->scene, s->model, s->path.rows[row], row % 3 == 2, &view));
     assert_int_equal(umb_cull(s->flat.frustum, &view, &flat), UMB_OK);
-    for (uint32_t k = 0; k < s->count; ++k) {
+    for (uint32_t k = s->rows++ % s->effort->share; k < s->count; k += s->effort->share) {
         crew *c = &s->crews[k];
         (void)snprintf(labels[k], sizeof labels[k], "%s row %u, %s", s->scene->name, row, c->name);
         assert_int_equal(umb_cull(c->frustum, &view, &seen), UMB_OK);
@@ -161,15 +162,13 @@ static void check_row(stand *s, uint32_t row)
     }
 }
 
-static double mean(uint64_t sum, uint64_t count)
-{
-    return count != 0 ? (double)sum / (double)count : 0.0;
-}
-
 /* Returns how many objects were wrongly hidden. */
-static uint64_t check_scene(const real_scene *scene, const effort *e)
+static uint64_t check_scene(const real_scene *scene)
 {
     static stand s;
+    const char *size = getenv("UMBRAGE_TEST_SIZE"), *step = getenv("UMBRAGE_SCENES_STEP");
+    effort wanted = size == NULL || size[0] == 'n' ? NORMAL : size[0] == 'f' ? FULL : SMALL, *e = &wanted;
+    e->walk_step = step != NULL && atoi(step) > 0 ? (uint32_t)atoi(step) : e->walk_step;
     s = (stand){.scene = scene, .effort = e};
     set_up(&s);
     for (uint32_t row = 0; row < s.path.count; ++row) {
@@ -184,8 +183,8 @@ static uint64_t check_scene(const real_scene *scene, const effort *e)
         const strict_count *f = &c->seen_in_frustum, *o = &c->seen;
         printf("# %-24s %-24s views %3llu in frustum %7.1f left out by parts %5.1f reported %6.1f truly visible %6.1f wrong %llu "
                "unconfirmed %llu\n",
-               scene->name, c->name, (unsigned long long)o->views, mean(f->reported, f->views), mean(c->left_out, o->views),
-               mean(o->reported, o->views), mean(o->truth_visible, o->views),
+               scene->name, c->name, (unsigned long long)o->views, scene_tests_mean(f->reported, f->views), scene_tests_mean(c->left_out, o->views),
+               scene_tests_mean(o->reported, o->views), scene_tests_mean(o->truth_visible, o->views),
                (unsigned long long)(f->wrongly_hidden + o->wrongly_hidden),
                (unsigned long long)(f->unconfirmed + o->unconfirmed));
         bad += f->wrongly_hidden + o->wrongly_hidden;
@@ -198,38 +197,12 @@ static uint64_t check_scene(const real_scene *scene, const effort *e)
 static void test_all_indices(void **state)
 {
     (void)state;
-    const char *folder = getenv("UMBRAGE_SCENES"), *size = getenv("UMBRAGE_TEST_SIZE");
-    if (folder == NULL || folder[0] == '\0') {
-        print_message("skipped: UMBRAGE_SCENES names no folder of real scenes\n");
-        skip();
-    }
-    const char *walk_step = getenv("UMBRAGE_SCENES_STEP");
-    effort e = size == NULL || size[0] == 'n' ? NORMAL : size[0] == 'f' ? FULL : SMALL;
-    e.walk_step = walk_step != NULL && atoi(walk_step) > 0 ? (uint32_t)atoi(walk_step) : e.walk_step;
-    real_scenes all;
-    umb_error error = {0};
-    if (!real_scenes_find(folder, &all, &error)) {
-        fail_msg("%s", error.text);
-    }
-    uint64_t bad = 0;
-    for (uint32_t i = 0; i < all.count; ++i) {
-        if (i % parts == part && strstr(all.scenes[i].name, only) != NULL) {
-            bad += check_scene(&all.scenes[i], &e);
-        }
-    }
-    real_scenes_free(&all);
-    assert_int_equal(bad, 0);
+    scene_tests_run(check_scene);
 }
 
 int main(int argc, char **argv)
 {
-    if (argc > 2) {
-        part = (uint32_t)atoi(argv[1]);
-        parts = atoi(argv[2]) > 0 ? (uint32_t)atoi(argv[2]) : 1;
-    }
-    if (argc > 3) {
-        only = argv[3];
-    }
+    scene_tests_arguments(argc, argv);
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_all_indices)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
