@@ -20,11 +20,22 @@
 /* Commits with moves after which a leaf looks again. */
 #define MOST_MOVES 64
 
+/* Direction k of the 26: towards the faces, edges and corners of a cube. */
+static umb_vec3 direction_of(uint32_t k)
+{
+    uint32_t code = k < 13 ? k : k + 1; /* without 0, 0, 0 */
+    umb_vec3 v = umb_vec3_make((int)(code % 3) - 1, (int)(code / 3 % 3) - 1, (int)(code / 9) - 1);
+    return umb_vec3_scale(v, 1.0 / umb_vec3_length(v));
+}
+
 void umb_leaf_lists_create(umb_leaf_lists *l, const umb_allocator *a)
 {
     memset(l, 0, sizeof *l);
     l->allocator = *a;
     l->wanted = UMB_NONE;
+    for (uint32_t k = 0; k < UMB_LEAF_DIRECTIONS; ++k) {
+        l->directions[k] = direction_of(k);
+    }
 }
 
 static size_t entry_count(const umb_leaf_lists *l)
@@ -296,20 +307,12 @@ bool umb_leaf_lists_follow(umb_leaf_lists *l, const umb_selector *s, const umb_c
 
 /* ---- looking ------------------------------------------------------------------------------------ */
 
-/* Direction k of the 26: towards the faces, edges and corners of a cube. */
-static umb_vec3 direction_of(uint32_t k)
-{
-    uint32_t code = k < 13 ? k : k + 1; /* without 0, 0, 0 */
-    umb_vec3 v = umb_vec3_make((int)(code % 3) - 1, (int)(code / 3 % 3) - 1, (int)(code / 9) - 1);
-    return umb_vec3_scale(v, 1.0 / umb_vec3_length(v));
-}
-
-static uint32_t nearest_direction(const double d[3])
+static uint32_t nearest_direction(const umb_leaf_lists *l, const double d[3])
 {
     uint32_t best = 0;
     double most = -INFINITY;
     for (uint32_t k = 0; k < UMB_LEAF_DIRECTIONS; ++k) {
-        double along = umb_vec3_dot(direction_of(k), umb_vec3_from_double(d));
+        double along = umb_vec3_dot(l->directions[k], umb_vec3_from_double(d));
         best = along > most ? k : best;
         most = along > most ? along : most;
     }
@@ -342,16 +345,15 @@ static void enter(umb_leaf_entry *list, uint16_t *count, uint32_t length, umb_le
     list[at] = e;
 }
 
-/* What is shown of it to whoever looks along v and not quite at it: by how large it looks, less the farther aside it is. What
- * stands along v, as walls of a corridor do, is seen all the same. */
-static double shown_ahead(const umb_select_look *look, umb_vec3 towards, double ahead)
+/* What it shows of its front where it stands. */
+static double shown_there(const umb_select_look *look, umb_vec3 towards)
 {
     double sum = 0.0;
     for (uint32_t i = 0; i < look->count; ++i) {
         double along = umb_vec3_dot(look->areas[i], towards);
         sum += along < 0.0 || look->two_sided ? fabs(along) : 0.0;
     }
-    return sum * fmax(ahead, LEAST_AHEAD);
+    return sum;
 }
 
 /* What it covers along v, seen from there. */
@@ -375,13 +377,15 @@ static void enter_everywhere(umb_leaf_lists *l, umb_leaf *leaf, const umb_select
     }
     square = square > 1e-30 ? square : 1e-30;
     umb_vec3 towards = umb_vec3_scale(look.centre, 1.0 / sqrt(square));
+    double there = shown_there(&look, towards);
     for (uint32_t k = 0; k < UMB_LEAF_DIRECTIONS; ++k) {
-        umb_vec3 v = direction_of(k);
+        umb_vec3 v = l->directions[k];
         double ahead = umb_vec3_dot(towards, v);
         if (!(ahead > 0.0) && square > sum) {
             continue; /* behind, and not all about */
         }
-        const double shown[2] = {shown_ahead(&look, towards, ahead), shown_behind(&look, v)};
+        /* Less the farther aside: what stands along v, as walls of a corridor do, is seen all the same. */
+        const double shown[2] = {there * fmax(ahead, LEAST_AHEAD), shown_behind(&look, v)};
         for (uint32_t side = 0; side < 2; ++side) {
             float score = (float)(shown[side] / square);
             if (score > 0.0f) {
@@ -438,7 +442,7 @@ const umb_leaf_entry *umb_leaf_lists_get(const umb_leaf_lists *l, uint32_t numbe
                                          const double direction[3], uint32_t *count)
 {
     const umb_leaf *leaf = &l->leaves[number];
-    uint32_t k = nearest_direction(direction);
+    uint32_t k = nearest_direction(l, direction);
     *count = leaf->entries != NULL ? leaf->counts[side][k] : 0;
     return leaf->entries != NULL ? leaf->entries + (size_t)(side * UMB_LEAF_DIRECTIONS + k) * l->length : NULL;
 }

@@ -38,6 +38,7 @@ typedef struct umb_leaf {
 
 typedef struct umb_leaf_lists {
     umb_allocator allocator;
+    umb_vec3 directions[UMB_LEAF_DIRECTIONS];
     umb_leaf *leaves; /* 1 << depth */
     float *at;        /* of the splits above them, children of k at 2 k + 1 and 2 k + 2 */
     uint8_t *axes;

@@ -112,7 +112,7 @@ static bool choose_way(planes *p, const umb_choice *choice)
     }
     p->eye[3] = v->parallel ? 0.0f : 1.0f;
     return p->way == UMB_PLANES_DIRECT ||
-           umb_planes_cache_begin(&p->cache, &p->allocator, choice->scene->version, p->way == UMB_PLANES_CACHED);
+           umb_planes_cache_begin(&p->cache, &p->allocator, choice->scene, p->way == UMB_PLANES_CACHED);
 }
 
 void umb_planes_go(void *state, umb_planes_way way)

@@ -2,27 +2,38 @@
 
 #include <string.h>
 
-enum { SETS = 8192 };
+enum { LEAST_SETS = 64, MOST_SETS = 8192 };
 
-bool umb_planes_cache_begin(umb_planes_cache *c, const umb_allocator *a, uint64_t version, bool keep)
+/* About one for each object: nodes are fewer, and edges of several are held against each. */
+static uint32_t sets_for(const umb_planes_cache *c, uint32_t objects)
 {
+    uint32_t n = c->set_count > LEAST_SETS ? c->set_count : LEAST_SETS;
+    while (n < MOST_SETS && n < objects) {
+        n *= 2;
+    }
+    return n;
+}
+
+bool umb_planes_cache_begin(umb_planes_cache *c, const umb_allocator *a, const umb_committed *scene, bool keep)
+{
+    uint32_t sets = keep ? sets_for(c, scene->object_count) : 0;
     if (c->frame == 0) {
         umb_tangent_table_make(&c->table);
     }
-    if (keep && c->set_count == 0) {
-        if (!umb_memory_reserve(a, (void **)&c->sets, &c->set_capacity, SETS, sizeof *c->sets) ||
-            !umb_memory_reserve(a, (void **)&c->entries, &c->entry_capacity, (size_t)SETS * UMB_PLANES_WAYS,
-                                sizeof *c->entries)) {
-            return false;
-        }
+    bool stale = c->version != scene->version || c->frame == 0 || sets != c->set_count;
+    if (keep && (!umb_memory_reserve(a, (void **)&c->sets, &c->set_capacity, sets, sizeof *c->sets) ||
+                 !umb_memory_reserve(a, (void **)&c->entries, &c->entry_capacity, (size_t)sets * UMB_PLANES_WAYS,
+                                     sizeof *c->entries))) {
+        c->set_count = 0;
+        return false;
     }
     c->frame = c->frame < UINT32_MAX ? c->frame + 1 : 1;
-    bool stale = c->version != version || c->frame == 1 || (keep && c->set_count == 0);
-    c->set_count = keep ? SETS : 0;
+    stale = stale || c->frame == 1;
+    c->set_count = sets;
     if (stale && keep) {
-        memset(c->sets, 0, SETS * sizeof *c->sets);
+        memset(c->sets, 0, sets * sizeof *c->sets);
     }
-    c->version = keep ? version : 0;
+    c->version = keep ? scene->version : 0;
     return true;
 }
 

@@ -34,8 +34,8 @@ typedef struct umb_planes_cache {
     uint64_t kept, made;      /* boxes whose planes were there, and whose were not */
 } umb_planes_cache;
 
-/* Begin a frame over a scene of this version. keep: else every question is answered anew. False without memory. */
-bool umb_planes_cache_begin(umb_planes_cache *c, const umb_allocator *a, uint64_t version, bool keep);
+/* Begin a frame over a scene. keep: else every question is answered anew. False without memory. */
+bool umb_planes_cache_begin(umb_planes_cache *c, const umb_allocator *a, const umb_committed *scene, bool keep);
 void umb_planes_cache_free(umb_planes_cache *c, const umb_allocator *a);
 
 /* The planes of an edge for the boxes of a node that mask names; others may be missing. Valid until the next call. */
