@@ -54,7 +54,7 @@ typedef enum umb_coherence {
        the next two, and UMB_COHERENCE_LIST with UMB_METHOD_SHADOW_FRUSTA: those that hid most in the last frame are
        chosen first. */
     UMB_COHERENCE_REST = 1u << 4,
-    /* UMB_METHOD_PLANES: tangent planes of occluders' edges and boxes are kept at the nodes, 19 MB of them, and used
+    /* UMB_METHOD_PLANES: tangent planes of occluders' edges and boxes are kept at the nodes, 19 MB of them at most, and used
        again when the eye has moved (Coorg and Teller 3.3); without, planes through the eye are made in each frame,
        which costs less (docs/results/planes.md). Answers are the same. */
     UMB_COHERENCE_PLANES = 1u << 5,
