@@ -688,10 +688,12 @@ int main(int count, char **words)
         return 3;
     }
     uint32_t missed = 0, left = 0;
+    uint64_t rays = 0;
     for (uint32_t i = 0; i < s.row_count; ++i) {
         left += !s.rows[i].done;
+        rays += s.rows[i].rays;
         missed += s.rows[i].ours.misses + s.rows[i].thesis.misses;
     }
-    printf("\n%u misses; the study took %.0f seconds.\n", missed, (now_ms() - start) / 1e3);
+    printf("\n%u misses in %" PRIu64 " rays; this run took %.0f seconds, rows left: %u.\n", missed, rays, (now_ms() - start) / 1e3, left);
     return missed != 0 ? 1 : s.log != NULL && left != 0 ? 4 : 0;
 }
