@@ -99,7 +99,9 @@ static inline void umb_heap_put_by(umb_heap *h, float until, uint32_t slot)
 static inline void umb_heap_close_gap(umb_heap *h, size_t first, size_t end)
 {
     size_t gone = end - first, after = h->by_count - end, moved = after < gone ? after : gone;
-    memmove(h->by + first, h->by + h->by_count - moved, moved * sizeof *h->by);
+    for (size_t i = 0; i < moved; ++i) {
+        h->by[first + i] = h->by[h->by_count - moved + i];
+    }
     h->by_count -= gone;
 }
 
