@@ -1,6 +1,6 @@
 /* The one interface of occlusion methods. A culler drives a method through a frame, in one of two ways.
  *
- * Methods that take occluders as the walk reaches them (the raster; best-first, culler.c):
+ * Methods that take occluders as the walk reaches them (the raster; cull/best_first.c):
  *
  *   prepare      the view and the committed scene; forget last frame's occluders
  *   hides        ask about a node's boxes; const, so that batches may be asked from several threads

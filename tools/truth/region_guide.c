@@ -24,8 +24,7 @@ static double spread(uint64_t random, uint64_t which, double low, double high)
     return low * pow(high / low, unit(random, which));
 }
 
-/* Sign of the eye's side of a triangle: -1 in front. */
-static int facing(const double eye[3], float v[3][3])
+int region_facing(const double eye[3], float v[3][3])
 {
     double e[3], f[3], sum = 0.0;
     for (int i = 0; i < 3; ++i) {
@@ -255,7 +254,7 @@ void region_border_item(region_hand *hand, uint64_t item)
         return;
     }
     oracle_triangle(h->t, w->object, w->triangle, v);
-    int side = facing(w->eye, v);
+    int side = region_facing(w->eye, v);
     for (int i = 0; i < 3; ++i) {
         /* Corners 1 and 2 of mirrored objects are swapped: edge i of the mesh is edge 2 - i here. */
         int e = h->t->mirrored[w->object] ? 2 - i : i;
@@ -268,7 +267,7 @@ void region_border_item(region_hand *hand, uint64_t item)
                 try_neighbour(hand, w->eye, w->object, other, u, random);
             }
             /* Not in the outline from here, and most likely not from elsewhere. */
-            if (side != 0 && facing(w->eye, u) == side && (random & 7) != 0) {
+            if (side != 0 && region_facing(w->eye, u) == side && (random & 7) != 0) {
                 continue;
             }
         }

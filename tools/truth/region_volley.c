@@ -58,20 +58,6 @@ static void point_of(float v[3][3], uint64_t random, double out[3])
     }
 }
 
-static bool faces(float v[3][3], const double eye[3])
-{
-    double e[3], f[3], sum = 0.0;
-    for (int i = 0; i < 3; ++i) {
-        e[i] = (double)v[1][i] - v[0][i];
-        f[i] = (double)v[2][i] - v[0][i];
-    }
-    for (int i = 0; i < 3; ++i) {
-        int j = (i + 1) % 3, k = (i + 2) % 3;
-        sum += (e[j] * f[k] - e[k] * f[j]) * (eye[i] - v[0][i]);
-    }
-    return sum > 0.0;
-}
-
 typedef struct volley {
     struct RTCRay rays[REGION_VOLLEY];
     double points[REGION_VOLLEY][3];
@@ -85,7 +71,7 @@ static void aim(const region_hunt *h, volley *s, const double eye[3], uint32_t o
     for (uint32_t i = 0; i < REGION_VOLLEY; ++i) {
         uint64_t choice = oracle_mix(random, i, 52);
         if (i % 4 == 0) { /* four at a triangle; one that looks away hides itself */
-            for (uint64_t k = 0; k < 4 && (k == 0 || !faces(v, eye)); ++k) {
+            for (uint64_t k = 0; k < 4 && (k == 0 || region_facing(eye, v) >= 0); ++k) {
                 s->triangles[i] = (uint32_t)(oracle_mix(choice, k, 53) % count);
                 oracle_triangle(h->t, object, s->triangles[i], v);
             }
