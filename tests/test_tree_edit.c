@@ -55,7 +55,7 @@ static bool same_box(const umb_node *node, uint32_t slot, const umb_aabb *box)
 static walked check_node(const grove *g, const umb_committed *c, uint32_t number, uint32_t least)
 {
     const umb_tree_edit *e = &g->edit;
-    const umb_node *node = &e->nodes[number];
+    const umb_node *node = &e->tree.nodes[number];
     walked sum = {1, 0, 1};
     assert_in_range(node->count, least, UMB_NODE_WIDTH);
     assert_false(umb_number_set_has(&e->free, number));
@@ -65,13 +65,13 @@ static walked check_node(const grove *g, const umb_committed *c, uint32_t number
             assert_int_equal(ref, UMB_NONE);
             assert_true(node->min[0][slot] == node->min[0][0]);
         } else if ((ref & UMB_REF_KIND) == UMB_REF_NODE) {
-            assert_true(of > number && of < e->node_count);
-            assert_int_equal(e->nodes[of].parent, number);
-            assert_int_equal(e->nodes[of].slot, slot);
-            umb_aabb below = umb_node_bounds(&e->nodes[of]);
+            assert_true(of > number && of < e->tree.node_count);
+            assert_int_equal(e->tree.nodes[of].parent, number);
+            assert_int_equal(e->tree.nodes[of].slot, slot);
+            umb_aabb below = umb_node_bounds(&e->tree.nodes[of]);
             assert_true(same_box(node, slot, &below));
             walked w = check_node(g, c, of, 2);
-            assert_true((e->nodes[of].layers & ~node->layers) == 0);
+            assert_true((e->tree.nodes[of].layers & ~node->layers) == 0);
             sum.nodes += w.nodes;
             sum.items += w.items;
             sum.depth = w.depth + 1 > sum.depth ? w.depth + 1 : sum.depth;
@@ -96,20 +96,20 @@ static walked check(const grove *g)
     walked w = {0, 0, 0};
     for (uint32_t i = 0; i < c->object_count; ++i) {
         items += c->objects[i].live;
-        assert_true(c->objects[i].live == (i < e->place_capacity && e->places[i] != UMB_NONE));
+        assert_true(c->objects[i].live == (i < e->tree.place_capacity && e->tree.places[i] != UMB_NONE));
     }
-    for (uint32_t i = 0; i < e->occluder_capacity; ++i) {
+    for (uint32_t i = 0; i < e->tree.occluder_capacity; ++i) {
         bool there = i >= c->first_free_occluder && i < c->occluder_count;
-        assert_true(there == (e->occluder_places[i] != UMB_NONE));
+        assert_true(there == (e->tree.occluder_places[i] != UMB_NONE));
     }
-    if (e->node_count > 0) {
+    if (e->tree.node_count > 0) {
         w = check_node(g, c, 0, 1);
     }
     assert_int_equal(w.items, items);
-    assert_int_equal(e->slot_count, items);
-    assert_int_equal(w.nodes + e->free.count, e->node_count);
+    assert_int_equal(e->tree.slot_count, items);
+    assert_int_equal(w.nodes + e->free.count, e->tree.node_count);
     for (uint32_t k = umb_number_set_next(&e->free, 0); k != UMB_NONE; k = umb_number_set_next(&e->free, k + 1)) {
-        assert_int_equal(e->nodes[k].count, 0);
+        assert_int_equal(e->tree.nodes[k].count, 0);
     }
     return w;
 }
@@ -154,7 +154,7 @@ static double build(grove *g, umb_tree_edit *e)
     }
     double cost = cost_of(built.nodes, built.node_count);
     if (e != NULL) {
-        umb_memory_free(&g->allocator, e->nodes, e->node_capacity * sizeof *e->nodes);
+        umb_memory_free(&g->allocator, e->tree.nodes, e->tree.node_capacity * sizeof *e->tree.nodes);
         assert_true(umb_tree_edit_adopt(e, built.nodes, built.node_count, built.node_count, false, c));
         assert_true(umb_update_reserve(&g->updater, e));
     } else {
@@ -244,7 +244,7 @@ static void edit(grove *g)
 /* As a culler would: some way down. */
 static void open_some(grove *g)
 {
-    for (uint32_t k = 0; k < g->edit.node_count && g->updater.opened != NULL; ++k) {
+    for (uint32_t k = 0; k < g->edit.tree.node_count && g->updater.opened != NULL; ++k) {
         if (random_below(&g->seed, 3) == 0) {
             g->updater.opened[k >> 6] |= (uint64_t)1 << (k & 63);
         }
@@ -283,18 +283,18 @@ static void check_lists(const grove *g)
 {
     const umb_tree_edit *e = &g->edit;
     const uint32_t *objects = g->job.ready.objects;
-    for (uint32_t k = 0; k < e->node_count; ++k) {
-        uint32_t at = e->below[k].first;
-        for (uint32_t slot = 0; slot < e->nodes[k].count && e->below[k].count != UMB_RANGE_STALE; ++slot) {
-            uint32_t ref = e->nodes[k].ref[slot];
+    for (uint32_t k = 0; k < e->tree.node_count; ++k) {
+        uint32_t at = e->tree.below[k].first;
+        for (uint32_t slot = 0; slot < e->tree.nodes[k].count && e->tree.below[k].count != UMB_RANGE_STALE; ++slot) {
+            uint32_t ref = e->tree.nodes[k].ref[slot];
             if ((ref & UMB_REF_KIND) == UMB_REF_NODE) {
-                assert_true(e->below[ref].first == at);
-                at += e->below[ref].count;
+                assert_true(e->tree.below[ref].first == at);
+                at += e->tree.below[ref].count;
             } else if ((ref & UMB_REF_KIND) == UMB_REF_OBJECT) {
                 assert_true(objects[at++] == (ref & UMB_REF_NUMBER));
             }
         }
-        assert_true(e->below[k].count == UMB_RANGE_STALE || at == e->below[k].first + e->below[k].count);
+        assert_true(e->tree.below[k].count == UMB_RANGE_STALE || at == e->tree.below[k].first + e->tree.below[k].count);
     }
 }
 
@@ -363,7 +363,7 @@ static void test_to_nothing(void **state)
             }
             follow(&g);
             check(&g);
-            assert_int_equal(g.edit.slot_count, 0);
+            assert_int_equal(g.edit.tree.slot_count, 0);
         }
         grove_tear_down(&g);
     }
@@ -404,7 +404,7 @@ static void test_insertion(void **state)
         }
         follow(&g);
         walked w = check(&g);
-        cost = cost_of(g.edit.nodes, g.edit.node_count);
+        cost = cost_of(g.edit.tree.nodes, g.edit.tree.node_count);
         least = build(&g, NULL);
         printf("# inserted %s: depth %u, nodes %u, cost %.2f of a new tree's\n", set == 0 ? "in a line" : "anywhere",
                w.depth, w.nodes, cost / least);
@@ -420,7 +420,7 @@ static void test_insertion(void **state)
         }
         follow(&g);
         w = check(&g);
-        cost = cost_of(g.edit.nodes, g.edit.node_count);
+        cost = cost_of(g.edit.tree.nodes, g.edit.tree.node_count);
         least = build(&g, NULL);
         printf("# exchanged: depth %u, nodes %u, cost %.2f of a new tree's\n", w.depth, w.nodes, cost / least);
         assert_true(w.depth < 24 && cost < 1.5 * least);
@@ -459,7 +459,7 @@ static void test_motion(void **state)
             follow(&g);
         }
         walked w = check(&g);
-        double cost = cost_of(g.edit.nodes, g.edit.node_count), least = build(&g, NULL);
+        double cost = cost_of(g.edit.tree.nodes, g.edit.tree.node_count), least = build(&g, NULL);
         printf("# strategy %d: depth %u, nodes %u, cost %.2f of a new tree's, rebuilt %u times\n", (int)strategies[s],
                w.depth, w.nodes, cost / least, g.rebuilt);
         assert_true(strategies[s] == UMB_UPDATE_REFIT || cost < 3.0 * least);
@@ -536,7 +536,7 @@ static void test_steady_memory(void **state)
             left = round == 2000 ? atomic_load(&memory.left) : left;
         }
         printf("# strategy %d: nodes %u, numbers %u, %lld allocations in 2,000 commits, rebuilt %u times\n",
-               (int)strategies[s], g.edit.node_count - g.edit.free.count, g.edit.node_count,
+               (int)strategies[s], g.edit.tree.node_count - g.edit.free.count, g.edit.tree.node_count,
                left - atomic_load(&memory.left), g.rebuilt);
         assert_true(left - atomic_load(&memory.left) == 0);
         grove_tear_down(&g);

@@ -190,19 +190,19 @@ static umb_aabb bounds_of(const umb_tree *tree)
 static void show(umb_index *index)
 {
     umb_tree *tree = &index->tree;
-    tree->nodes = index->edit.nodes;
-    tree->node_count = index->edit.node_count;
+    tree->nodes = index->edit.tree.nodes;
+    tree->node_count = index->edit.tree.node_count;
     tree->node_room = (uint32_t)index->edit.room;
-    tree->item_count = index->edit.slot_count;
-    tree->below = index->edit.below;
+    tree->item_count = index->edit.tree.slot_count;
+    tree->below = index->edit.tree.below;
     tree->objects = index->objects;
     tree->blocks = index->blocks;
     tree->volumes = index->volumes.list;
     tree->opened = index->updater.opened;
     tree->touched = index->edit.touched;
     tree->touched_count = index->edit.touched_count;
-    tree->places = index->edit.places;
-    tree->occluder_places = index->edit.occluder_places;
+    tree->places = index->edit.tree.places;
+    tree->occluder_places = index->edit.tree.occluder_places;
 }
 
 /* What readers see, from the nodes. */
@@ -235,7 +235,7 @@ static void drop(umb_index *index)
 static void list_objects(umb_index *index)
 {
     umb_tree_edit *e = &index->edit;
-    index->tree.object_count = umb_bvh_list_objects(e->nodes, e->node_count, index->objects, e->below);
+    index->tree.object_count = umb_bvh_list_objects(e->tree.nodes, e->tree.node_count, index->objects, e->tree.below);
     e->stale = 0;
 }
 
@@ -260,7 +260,7 @@ static bool furnish(umb_index *index, uint32_t node_count, uint32_t slot_count, 
     return umb_memory_reserve(a, (void **)&index->objects, &index->object_capacity,
                               (size_t)slot_count + UMB_TREE_SPARE, sizeof(uint32_t)) &&
            umb_memory_reserve(a, (void **)&index->blocks, &index->block_capacity, block_count, sizeof(umb_node)) &&
-           umb_memory_reserve(a, (void **)&e->below, &e->below_capacity, (size_t)node_count + block_count,
+           umb_memory_reserve(a, (void **)&e->tree.below, &e->tree.below_capacity, (size_t)node_count + block_count,
                               sizeof(umb_range));
 }
 
@@ -270,8 +270,8 @@ static umb_result adopt(umb_index *index, const umb_committed *c, umb_built *bui
     const umb_allocator *a = &index->allocator;
     umb_tree *tree = &index->tree;
     umb_tree_edit *e = &index->edit;
-    umb_node *old = e->nodes;
-    size_t old_bytes = e->node_capacity * sizeof(umb_node);
+    umb_node *old = e->tree.nodes;
+    size_t old_bytes = e->tree.node_capacity * sizeof(umb_node);
     bool several = built->slot_count > item_count;
     uint32_t blocks = tree->flat ? count_blocks(built->node_count) : 0;
     if (!furnish(index, built->node_count, built->slot_count, blocks) ||
@@ -292,7 +292,7 @@ static umb_result adopt(umb_index *index, const umb_committed *c, umb_built *bui
     list_objects(index);
     if (blocks > 0) {
         memset(index->blocks, 0, blocks * sizeof(umb_node));
-        lay_blocks(index->blocks, e->below, built->node_count);
+        lay_blocks(index->blocks, e->tree.below, built->node_count);
     }
     umb_rebuild_job_drop(&index->job);
     if (!umb_update_reserve(&index->updater, e)) {
@@ -314,10 +314,10 @@ static umb_result fill_voxels(umb_index *index, const umb_committed *c, uint32_t
         gather_items(c, items);
         index->updater.voxels = umb_voxels_choose(items, count);
         umb_voxels_build(&index->updater.voxels, e, items, count);
-        umb_bvh_lift_marked(e->nodes, &e->marks, e->volumes);
+        umb_bvh_lift_marked(e->tree.nodes, &e->tree.marks, e->volumes);
         umb_tree_edit_learn(e);
         index->live_count = count - (c->occluder_count - c->first_free_occluder);
-        if (e->failed || !furnish(index, e->node_count, e->slot_count, 0)) {
+        if (e->failed || !furnish(index, e->tree.node_count, e->tree.slot_count, 0)) {
             e->failed = true;
             result = UMB_ERROR_MEMORY;
         } else {
@@ -402,10 +402,10 @@ static bool follow(umb_index *index, const umb_committed *c)
         take_list(index);
     }
     /* Lists made anew for every so many edits cost each of them the same. */
-    if (e->stale > e->slot_count / 4 + 64 && furnish(index, e->node_count, e->slot_count, 0)) {
+    if (e->stale > e->tree.slot_count / 4 + 64 && furnish(index, e->tree.node_count, e->tree.slot_count, 0)) {
         list_objects(index);
     } else if (e->stale > 0) {
-        index->tree.object_count = e->slot_count;
+        index->tree.object_count = e->tree.slot_count;
     }
     return true;
 }

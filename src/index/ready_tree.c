@@ -53,19 +53,13 @@ static const umb_aabb *box_of(const umb_committed *scene, uint32_t ref)
     return (ref & UMB_REF_KIND) == UMB_REF_OBJECT ? &scene->objects[number].bounds : &scene->occluders[number].bounds;
 }
 
-static uint32_t *place_of(umb_tree_stock *s, uint32_t ref)
-{
-    uint32_t number = ref & UMB_REF_NUMBER;
-    return (ref & UMB_REF_KIND) == UMB_REF_OBJECT ? &s->places[number] : &s->occluder_places[number];
-}
-
 static void fetch_items(umb_tree_stock *s, uint32_t number, const umb_committed *scene)
 {
     const umb_node *node = &s->nodes[number];
     for (uint32_t slot = 0; slot < node->count; ++slot) {
         if (!umb_slot_is_node(node, slot)) {
             __builtin_prefetch(box_of(scene, node->ref[slot]));
-            __builtin_prefetch(place_of(s, node->ref[slot]), 1);
+            __builtin_prefetch(umb_tree_stock_place(s, node->ref[slot]), 1);
         }
     }
 }
@@ -83,7 +77,7 @@ static void fit_node(umb_tree_stock *s, uint32_t number, const umb_committed *sc
             node->items += s->nodes[ref].items;
         } else {
             umb_slot_set_box(node, slot, box_of(scene, ref));
-            *place_of(s, ref) = number * UMB_NODE_WIDTH + slot;
+            *umb_tree_stock_place(s, ref) = number * UMB_NODE_WIDTH + slot;
             node->items += 1;
         }
     }
@@ -149,9 +143,9 @@ bool umb_ready_tree_exchange(umb_ready_tree *t, umb_tree_edit *e, const umb_comm
 {
     bool done = umb_tree_edit_exchange(e, &t->stock, scene);
     if (done) {
-        umb_bvh_lift_marked(e->nodes, &e->marks, NULL);
+        umb_bvh_lift_marked(e->tree.nodes, &e->tree.marks, NULL);
         if (e->volumes != NULL) {
-            umb_node_volumes_fit_all(e->volumes, e->nodes, e->node_count);
+            umb_node_volumes_fit_all(e->volumes, e->tree.nodes, e->tree.node_count);
         }
     }
     return done;

@@ -52,11 +52,11 @@ void umb_rebuild_job_drop(umb_rebuild_job *job)
 static double sample_growth(const umb_tree_edit *e, uint32_t phase, uint32_t step)
 {
     double now = 0.0, then = 0.0;
-    for (uint32_t k = phase % step; k < e->node_count; k += step) {
-        const umb_node *node = &e->nodes[k];
+    for (uint32_t k = phase % step; k < e->tree.node_count; k += step) {
+        const umb_node *node = &e->tree.nodes[k];
         uint64_t later = k + (uint64_t)SAMPLE_AHEAD * step;
-        for (size_t i = 0; i < sizeof *node && step > SAMPLE && later < e->node_count; i += 64) {
-            __builtin_prefetch((const char *)&e->nodes[later] + i);
+        for (size_t i = 0; i < sizeof *node && step > SAMPLE && later < e->tree.node_count; i += 64) {
+            __builtin_prefetch((const char *)&e->tree.nodes[later] + i);
         }
         if (node->count > 0) {
             now += (double)umb_tree_edit_area(node) * node->count;
@@ -70,7 +70,7 @@ double umb_rebuild_job_watch(umb_rebuild_job *job, const umb_tree_edit *e, const
 {
     if (scene->moved_count > 0 || structure) {
         uint64_t changes = (uint64_t)scene->moved_count + (structure ? scene->came_count + scene->went_count : 0);
-        uint32_t step = (uint32_t)(e->node_count / (LEAST_SAMPLE + changes / CHANGES_A_SAMPLE)) + 1;
+        uint32_t step = (uint32_t)(e->tree.node_count / (LEAST_SAMPLE + changes / CHANGES_A_SAMPLE)) + 1;
         step = step > SAMPLE ? step : SAMPLE;
         job->phase += 7919; /* a prime: all nodes have their turn */
         double growth = sample_growth(e, job->phase, step);
@@ -86,12 +86,12 @@ double umb_rebuild_job_watch(umb_rebuild_job *job, const umb_tree_edit *e, const
 static bool reserve(umb_rebuild_job *job, umb_tree_edit *e, const umb_committed *scene)
 {
     const umb_allocator *a = e->allocator;
-    size_t count = e->slot_count, nodes = e->node_count - e->free.count;
+    size_t count = e->tree.slot_count, nodes = e->tree.node_count - e->free.count;
     /* Trees of the same items differ a little in nodes: room is made for more than is asked for. */
     bool little = job->ready.stock.node_capacity < nodes + nodes / 16 + 32 || e->room < nodes + nodes / 16 + 32;
     nodes += little ? nodes / 8 + 64 : 0;
     job->steps = job->steps != NULL ? job->steps : umb_bvh_steps_create(a);
-    return job->steps != NULL && umb_bvh_steps_reserve(job->steps, a, e->slot_count) &&
+    return job->steps != NULL && umb_bvh_steps_reserve(job->steps, a, e->tree.slot_count) &&
            umb_tree_edit_reserve(e, nodes) &&
            umb_memory_reserve(a, (void **)&job->items, &job->item_capacity, count, sizeof *job->items) &&
            umb_memory_reserve(a, (void **)&job->splits, &job->split_capacity, count, sizeof *job->splits) &&
@@ -247,7 +247,7 @@ static void put_right(umb_tree_edit *e, const umb_committed *scene, uint32_t ref
     uint32_t number = ref & UMB_REF_NUMBER;
     bool object = (ref & UMB_REF_KIND) == UMB_REF_OBJECT, there;
     there = object ? scene->objects[number].live : number >= scene->first_free_occluder && number < scene->occluder_count;
-    if (number < (object ? e->place_capacity : e->occluder_capacity)) {
+    if (number < (object ? e->tree.place_capacity : e->tree.occluder_capacity)) {
         umb_tree_edit_remove(e, ref, UMB_NONE);
     }
     if (there) {
@@ -262,7 +262,7 @@ static bool exchange(umb_rebuild_job *job, umb_tree_edit *e, const umb_committed
     for (uint32_t i = 0; i < job->log_count && !e->failed; ++i) {
         put_right(e, scene, job->log[i]);
     }
-    umb_bvh_lift_marked(e->nodes, &e->marks, e->volumes);
+    umb_bvh_lift_marked(e->tree.nodes, &e->tree.marks, e->volumes);
     return done;
 }
 
@@ -271,7 +271,7 @@ static bool exchange(umb_rebuild_job *job, umb_tree_edit *e, const umb_committed
 static int64_t budget_of(const umb_tree_edit *e, const umb_committed *scene, bool structure)
 {
     int64_t changes = (int64_t)scene->moved_count + (structure ? scene->came_count + scene->went_count : 0);
-    int64_t part = (int64_t)e->slot_count * TOTAL_COST / COMMITS, most = MOST_WORK + WORK_A_CHANGE * changes;
+    int64_t part = (int64_t)e->tree.slot_count * TOTAL_COST / COMMITS, most = MOST_WORK + WORK_A_CHANGE * changes;
     part = part < most ? part : most;
     return part > LEAST_WORK ? part : LEAST_WORK;
 }
@@ -306,7 +306,7 @@ bool umb_rebuild_job_step(umb_rebuild_job *job, umb_tree_edit *e, const umb_comm
     bool exchanged = false;
     if (job->stage == UMB_JOB_IDLE) {
         double growth = umb_rebuild_job_watch(job, e, scene, structure);
-        if ((scene->moved_count == 0 && !structure) || e->slot_count <= UMB_NODE_WIDTH || !reserve(job, e, scene) ||
+        if ((scene->moved_count == 0 && !structure) || e->tree.slot_count <= UMB_NODE_WIDTH || !reserve(job, e, scene) ||
             growth <= BEGIN_GROWTH) {
             return false;
         }

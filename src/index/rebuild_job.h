@@ -45,8 +45,8 @@ void umb_rebuild_job_drop(umb_rebuild_job *job);
 double umb_rebuild_job_watch(umb_rebuild_job *job, const umb_tree_edit *e, const umb_committed *scene, bool structure);
 
 /* After the tree has followed a commit: look whether it has grown worse, begin if it has, and go on with the work.
- * True if a new tree has taken its place: its list of objects is in ready.objects. Without memory, or when too much changes meanwhile, the work is dropped and
- * the tree in use stays. */
+ * True if a new tree has taken its place: its list of objects is in ready.objects. Without memory, or when too much changes
+ * meanwhile, the work is dropped and the tree in use stays. */
 bool umb_rebuild_job_step(umb_rebuild_job *job, umb_tree_edit *e, const umb_committed *scene, bool structure);
 
 #endif

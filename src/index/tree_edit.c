@@ -1,22 +1,15 @@
 #include "tree_edit.h"
 
 #include <float.h>
-#include <string.h>
 
 #include "cut.h"
 #include "slot_choice.h"
 
 /* ---- places --------------------------------------------------------------------------------- */
 
-static uint32_t *head_of(umb_tree_edit *e, uint32_t ref)
-{
-    uint32_t number = ref & UMB_REF_NUMBER;
-    return (ref & UMB_REF_KIND) == UMB_REF_OBJECT ? &e->places[number] : &e->occluder_places[number];
-}
-
 void umb_tree_edit_link(umb_tree_edit *e, uint32_t ref, uint32_t place)
 {
-    uint32_t *head = head_of(e, ref);
+    uint32_t *head = umb_tree_stock_place(&e->tree, ref);
     if (e->next != NULL) {
         e->next[place] = *head;
     }
@@ -25,24 +18,17 @@ void umb_tree_edit_link(umb_tree_edit *e, uint32_t ref, uint32_t place)
 
 void umb_tree_edit_unlink(umb_tree_edit *e, uint32_t ref, uint32_t place)
 {
-    uint32_t *link = head_of(e, ref);
+    uint32_t *link = umb_tree_stock_place(&e->tree, ref);
     while (e->next != NULL && *link != place) {
         link = &e->next[*link];
     }
     *link = e->next != NULL ? e->next[place] : UMB_NONE;
 }
 
-static void forget_places(uint32_t *places, size_t count)
-{
-    if (count > 0) {
-        memset(places, 0xFF, count * sizeof *places);
-    }
-}
-
 bool umb_tree_edit_reserve_places(umb_tree_edit *e, const umb_committed *scene)
 {
-    return umb_memory_reserve_none(e->allocator, &e->places, &e->place_capacity, scene->object_count) &&
-           umb_memory_reserve_none(e->allocator, &e->occluder_places, &e->occluder_capacity, scene->occluder_count);
+    return umb_memory_reserve_none(e->allocator, &e->tree.places, &e->tree.place_capacity, scene->object_count) &&
+           umb_memory_reserve_none(e->allocator, &e->tree.occluder_places, &e->tree.occluder_capacity, scene->occluder_count);
 }
 
 /* ---- nodes ---------------------------------------------------------------------------------- */
@@ -51,10 +37,10 @@ bool umb_tree_edit_reserve_places(umb_tree_edit *e, const umb_committed *scene)
 static bool reserve_beside(umb_tree_edit *e)
 {
     const umb_allocator *a = e->allocator;
-    size_t nodes = e->node_capacity, next = e->next != NULL ? nodes * UMB_NODE_WIDTH : 0;
-    return umb_memory_reserve(a, (void **)&e->below, &e->below_capacity, nodes, sizeof *e->below) &&
+    size_t nodes = e->tree.node_capacity, next = e->next != NULL ? nodes * UMB_NODE_WIDTH : 0;
+    return umb_memory_reserve(a, (void **)&e->tree.below, &e->tree.below_capacity, nodes, sizeof *e->tree.below) &&
            umb_memory_reserve(a, (void **)&e->next, &e->next_capacity, next, sizeof *e->next) &&
-           umb_bvh_marks_reserve(&e->marks, a, (uint32_t)nodes) &&
+           umb_bvh_marks_reserve(&e->tree.marks, a, (uint32_t)nodes) &&
            (e->volumes == NULL || umb_node_volumes_reserve(e->volumes, a, nodes)) &&
            umb_number_set_reserve(&e->free, a, (uint32_t)nodes);
 }
@@ -65,11 +51,11 @@ bool umb_tree_edit_reserve(umb_tree_edit *e, size_t nodes)
         return true;
     }
     if (nodes > UMB_REF_NUMBER / UMB_NODE_WIDTH ||
-        !umb_memory_reserve(e->allocator, (void **)&e->nodes, &e->node_capacity, nodes, sizeof *e->nodes) ||
+        !umb_memory_reserve(e->allocator, (void **)&e->tree.nodes, &e->tree.node_capacity, nodes, sizeof *e->tree.nodes) ||
         !reserve_beside(e)) {
         return false;
     }
-    e->room = e->node_capacity;
+    e->room = e->tree.node_capacity;
     return true;
 }
 
@@ -79,38 +65,38 @@ uint32_t umb_tree_edit_new_node(umb_tree_edit *e, uint32_t parent)
     uint32_t number = umb_number_set_next(&e->free, parent == UMB_NONE ? 0 : parent + 1);
     if (number != UMB_NONE) {
         umb_number_set_remove(&e->free, number);
-    } else if (!umb_tree_edit_reserve(e, (size_t)e->node_count + 1)) {
+    } else if (!umb_tree_edit_reserve(e, (size_t)e->tree.node_count + 1)) {
         e->failed = true;
         return UMB_NONE;
     } else {
-        number = e->node_count++;
+        number = e->tree.node_count++;
     }
-    e->nodes[number] = (umb_node){.parent = parent};
-    e->below[number].count = UMB_RANGE_STALE;
+    e->tree.nodes[number] = (umb_node){.parent = parent};
+    e->tree.below[number].count = UMB_RANGE_STALE;
     return number;
 }
 
 /* A node that nothing names any more. Without slots it is nothing to any pass over all nodes. */
 void umb_tree_edit_give_node(umb_tree_edit *e, uint32_t number)
 {
-    umb_node *node = &e->nodes[number];
+    umb_node *node = &e->tree.nodes[number];
     *node = (umb_node){.parent = UMB_NONE};
     for (uint32_t slot = 0; slot < UMB_NODE_WIDTH; ++slot) {
         node->ref[slot] = UMB_NONE;
     }
-    e->below[number] = (umb_range){0, 0};
+    e->tree.below[number] = (umb_range){0, 0};
     umb_number_set_add(&e->free, number);
 }
 
 /* The items below change by so many, from a node up to and without another; what comes is in some layers. */
 static void count(umb_tree_edit *e, uint32_t node, uint32_t under, uint32_t by, uint32_t layers)
 {
-    for (; node != under && node != UMB_NONE; node = e->nodes[node].parent) {
-        umb_node *n = &e->nodes[node];
+    for (; node != under && node != UMB_NONE; node = e->tree.nodes[node].parent) {
+        umb_node *n = &e->tree.nodes[node];
         n->items += by;
         n->layers |= layers;
         n->edits += e->wears;
-        e->below[node].count = UMB_RANGE_STALE;
+        e->tree.below[node].count = UMB_RANGE_STALE;
         if (e->wears && n->edits < UMB_EDITS_WORN && n->edits > n->items / 2 + UMB_NODE_WIDTH &&
             e->worn_count < e->worn_capacity) {
             e->worn[e->worn_count++] = node;
@@ -132,30 +118,30 @@ static void touch(umb_tree_edit *e, uint32_t number)
 
 static void write_slot(umb_tree_edit *e, uint32_t number, uint32_t slot, const umb_aabb *box, uint32_t ref)
 {
-    umb_node *node = &e->nodes[number];
+    umb_node *node = &e->tree.nodes[number];
     umb_slot_set_box(node, slot, box);
     node->ref[slot] = ref;
-    node->layers |= umb_ref_layers(e->scene, e->nodes, ref);
+    node->layers |= umb_ref_layers(e->scene, e->tree.nodes, ref);
     if ((ref & UMB_REF_KIND) == UMB_REF_NODE) {
-        e->nodes[ref].parent = number;
-        e->nodes[ref].slot = slot;
+        e->tree.nodes[ref].parent = number;
+        e->tree.nodes[ref].slot = slot;
     } else {
         umb_tree_edit_link(e, ref, number * UMB_NODE_WIDTH + slot);
     }
-    umb_bvh_mark(&e->marks, number);
+    umb_bvh_mark(&e->tree.marks, number);
     touch(e, number);
 }
 
 /* Into a free slot. */
 void umb_tree_edit_put(umb_tree_edit *e, uint32_t node, const umb_aabb *box, uint32_t ref)
 {
-    write_slot(e, node, e->nodes[node].count++, box, ref);
+    write_slot(e, node, e->tree.nodes[node].count++, box, ref);
 }
 
 /* Make a slot free; what it names is linked to it no more. The last slot fills the gap. */
 static void cut_slot(umb_tree_edit *e, uint32_t number, uint32_t slot)
 {
-    umb_node *node = &e->nodes[number];
+    umb_node *node = &e->tree.nodes[number];
     uint32_t ref = node->ref[slot], last = --node->count, moved = node->ref[last];
     if ((ref & UMB_REF_KIND) != UMB_REF_NODE) {
         umb_tree_edit_unlink(e, ref, number * UMB_NODE_WIDTH + slot);
@@ -168,14 +154,14 @@ static void cut_slot(umb_tree_edit *e, uint32_t number, uint32_t slot)
         write_slot(e, number, slot, &box, moved);
     }
     node->ref[last] = UMB_NONE;
-    umb_bvh_mark(&e->marks, number);
+    umb_bvh_mark(&e->tree.marks, number);
     touch(e, number);
 }
 
 /* What the only slot of a node names takes the node's place in its parent. */
 static void hoist(umb_tree_edit *e, uint32_t number)
 {
-    umb_node *node = &e->nodes[number];
+    umb_node *node = &e->tree.nodes[number];
     uint32_t parent = node->parent, slot = node->slot, ref = node->ref[0];
     umb_aabb box = umb_slot_box(node, 0);
     if ((ref & UMB_REF_KIND) != UMB_REF_NODE) {
@@ -188,9 +174,9 @@ static void hoist(umb_tree_edit *e, uint32_t number)
 /* The root's only child becomes the root. */
 static void lower_root(umb_tree_edit *e)
 {
-    umb_node *root = &e->nodes[0];
+    umb_node *root = &e->tree.nodes[0];
     uint32_t child = root->ref[0];
-    umb_node old = e->nodes[child];
+    umb_node old = e->tree.nodes[child];
     root->count = 0;
     for (uint32_t slot = 0; slot < old.count; ++slot) {
         umb_aabb box = umb_slot_box(&old, slot);
@@ -205,22 +191,23 @@ static void lower_root(umb_tree_edit *e)
 /* Nodes that hold nothing, or one thing only, are none. */
 void umb_tree_edit_tidy(umb_tree_edit *e, uint32_t number, uint32_t under)
 {
-    while (number != under && number != UMB_NONE && e->nodes[number].count < 2) {
-        uint32_t parent = e->nodes[number].parent;
+    while (number != under && number != UMB_NONE && e->tree.nodes[number].count < 2) {
+        uint32_t parent = e->tree.nodes[number].parent;
         if (parent == UMB_NONE) {
-            if (e->nodes[number].cell == 0 && e->nodes[number].count == 1 && (e->nodes[number].ref[0] & UMB_REF_KIND) == UMB_REF_NODE) {
+            const umb_node *root = &e->tree.nodes[number];
+            if (root->cell == 0 && root->count == 1 && (root->ref[0] & UMB_REF_KIND) == UMB_REF_NODE) {
                 lower_root(e);
             }
             return;
         }
-        if (e->nodes[number].count == 1 && e->nodes[number].cell != 0) {
+        if (e->tree.nodes[number].count == 1 && e->tree.nodes[number].cell != 0) {
             return; /* a cell is one for one thing, too */
         }
-        if (e->nodes[number].count == 1) {
+        if (e->tree.nodes[number].count == 1) {
             hoist(e, number);
             return;
         }
-        cut_slot(e, parent, e->nodes[number].slot);
+        cut_slot(e, parent, e->tree.nodes[number].slot);
         umb_tree_edit_give_node(e, number);
         number = parent;
     }
@@ -231,7 +218,7 @@ static void remove_place(umb_tree_edit *e, uint32_t place, uint32_t under)
     uint32_t node = place / UMB_NODE_WIDTH;
     count(e, node, under, (uint32_t)-1, 0);
     cut_slot(e, node, place % UMB_NODE_WIDTH);
-    e->slot_count -= 1;
+    e->tree.slot_count -= 1;
     e->stale += 1;
     umb_tree_edit_tidy(e, node, under);
 }
@@ -250,8 +237,8 @@ void umb_tree_edit_remove(umb_tree_edit *e, uint32_t ref, uint32_t under)
     for (uint32_t place = umb_tree_edit_place(e, ref); place != UMB_NONE; place = umb_tree_edit_place(e, ref)) {
         remove_place(e, place, under);
     }
-    if (e->slot_count == 0) {
-        e->node_count = 0;
+    if (e->tree.slot_count == 0) {
+        e->tree.node_count = 0;
         umb_number_set_clear(&e->free);
     }
 }
@@ -265,7 +252,7 @@ static uint32_t pair(umb_tree_edit *e, uint32_t number, uint32_t slot, const umb
     if (made == UMB_NONE) {
         return UMB_NONE;
     }
-    umb_node *node = &e->nodes[number];
+    umb_node *node = &e->tree.nodes[number];
     uint32_t other = node->ref[slot];
     umb_aabb both = umb_slot_box(node, slot);
     umb_tree_edit_unlink(e, other, number * UMB_NODE_WIDTH + slot);
@@ -273,14 +260,14 @@ static uint32_t pair(umb_tree_edit *e, uint32_t number, uint32_t slot, const umb
     umb_tree_edit_put(e, made, box, ref);
     umb_aabb_grow(&both, box);
     write_slot(e, number, slot, &both, made);
-    e->nodes[made].items = 1; /* the new one is counted with the rest of the way */
+    e->tree.nodes[made].items = 1; /* the new one is counted with the rest of the way */
     return made;
 }
 
 static uint32_t insert_cheapest(umb_tree_edit *e, uint32_t number, const umb_aabb *box, uint32_t ref)
 {
     for (;;) {
-        umb_node *node = &e->nodes[number];
+        umb_node *node = &e->tree.nodes[number];
         if (node->count == 0) {
             umb_tree_edit_put(e, number, box, ref);
             return number;
@@ -294,7 +281,7 @@ static uint32_t insert_cheapest(umb_tree_edit *e, uint32_t number, const umb_aab
             return pair(e, number, c.slot, box, ref);
         }
         umb_slot_grow(node, c.slot, box);
-        umb_bvh_mark(&e->marks, number);
+        umb_bvh_mark(&e->tree.marks, number);
         number = node->ref[c.slot];
     }
 }
@@ -304,7 +291,7 @@ static uint32_t insert_cheapest(umb_tree_edit *e, uint32_t number, const umb_aab
 static bool split_full(umb_tree_edit *e, uint32_t number, const umb_aabb *box)
 {
     umb_slot_groups groups;
-    umb_slot_group(&e->nodes[number], box, &groups);
+    umb_slot_group(&e->tree.nodes[number], box, &groups);
     bool freed = false;
     for (uint32_t g = 0; g < 8; ++g) {
         if (groups.count[g] < 2 || groups.count[g] == UMB_NODE_WIDTH) {
@@ -316,7 +303,7 @@ static bool split_full(umb_tree_edit *e, uint32_t number, const umb_aabb *box)
         }
         umb_aabb all = {{0, 0, 0}, {0, 0, 0}};
         for (uint32_t slot = UMB_NODE_WIDTH; slot-- > 0;) {
-            umb_node *node = &e->nodes[number];
+            umb_node *node = &e->tree.nodes[number];
             if (groups.of[slot] != g) {
                 continue;
             }
@@ -326,12 +313,12 @@ static bool split_full(umb_tree_edit *e, uint32_t number, const umb_aabb *box)
             groups.of[slot] = groups.of[node->count]; /* the last one fills the gap */
             groups.of[node->count] = UMB_SLOT_NO_GROUP;
             umb_tree_edit_put(e, made, &b, ref);
-            if (e->nodes[made].count == 1) {
+            if (e->tree.nodes[made].count == 1) {
                 all = b;
             }
             umb_aabb_grow(&all, &b);
         }
-        e->nodes[made].items = e->nodes[made].count;
+        e->tree.nodes[made].items = e->tree.nodes[made].count;
         umb_tree_edit_put(e, number, &all, made);
         freed = true;
     }
@@ -342,7 +329,7 @@ static uint32_t insert_deepest(umb_tree_edit *e, uint32_t number, const umb_aabb
 {
     bool split = false;
     for (;;) {
-        umb_node *node = &e->nodes[number];
+        umb_node *node = &e->tree.nodes[number];
         uint32_t slot = umb_slot_holding(node, box);
         if (slot != UMB_NONE) {
             number = node->ref[slot];
@@ -360,7 +347,7 @@ static uint32_t insert_deepest(umb_tree_edit *e, uint32_t number, const umb_aabb
 void umb_tree_edit_insert(umb_tree_edit *e, umb_tree_way way, uint32_t node, uint32_t under, const umb_aabb *box,
                           uint32_t ref)
 {
-    if (e->node_count == 0) {
+    if (e->tree.node_count == 0) {
         node = umb_tree_edit_new_node(e, UMB_NONE);
         under = UMB_NONE;
         if (node == UMB_NONE) {
@@ -372,27 +359,27 @@ void umb_tree_edit_insert(umb_tree_edit *e, umb_tree_way way, uint32_t node, uin
         e->failed = true;
         return;
     }
-    e->slot_count += 1;
+    e->tree.slot_count += 1;
     e->stale += 1;
-    count(e, in, under, 1, umb_ref_layers(e->scene, e->nodes, ref));
+    count(e, in, under, 1, umb_ref_layers(e->scene, e->tree.nodes, ref));
 }
 
 bool umb_tree_edit_hold(umb_tree_edit *e, uint32_t number, const umb_aabb *box, uint32_t ref)
 {
-    if (e->nodes[number].count == UMB_NODE_WIDTH) {
+    if (e->tree.nodes[number].count == UMB_NODE_WIDTH) {
         return false;
     }
     umb_tree_edit_put(e, number, box, ref);
-    e->slot_count += 1;
+    e->tree.slot_count += 1;
     e->stale += 1;
     return true;
 }
 
 uint32_t umb_tree_edit_holder(const umb_tree_edit *e, uint32_t node, const umb_aabb *box)
 {
-    while (e->nodes[node].parent != UMB_NONE &&
-           !umb_slot_holds(&e->nodes[e->nodes[node].parent], e->nodes[node].slot, box)) {
-        node = e->nodes[node].parent;
+    while (e->tree.nodes[node].parent != UMB_NONE &&
+           !umb_slot_holds(&e->tree.nodes[e->tree.nodes[node].parent], e->tree.nodes[node].slot, box)) {
+        node = e->tree.nodes[node].parent;
     }
     return node;
 }
@@ -400,8 +387,8 @@ uint32_t umb_tree_edit_holder(const umb_tree_edit *e, uint32_t node, const umb_a
 void umb_tree_edit_set_box(umb_tree_edit *e, uint32_t ref, const umb_aabb *box)
 {
     uint32_t place = umb_tree_edit_place(e, ref);
-    umb_slot_set_box(&e->nodes[place / UMB_NODE_WIDTH], place % UMB_NODE_WIDTH, box);
-    umb_bvh_mark(&e->marks, place / UMB_NODE_WIDTH);
+    umb_slot_set_box(&e->tree.nodes[place / UMB_NODE_WIDTH], place % UMB_NODE_WIDTH, box);
+    umb_bvh_mark(&e->tree.marks, place / UMB_NODE_WIDTH);
 }
 
 /* ---- layers --------------------------------------------------------------------------------- */
@@ -409,11 +396,11 @@ void umb_tree_edit_set_box(umb_tree_edit *e, uint32_t ref, const umb_aabb *box)
 /* From a node up, as far as that changes anything. */
 static void relayer(umb_tree_edit *e, uint32_t number)
 {
-    for (; number != UMB_NONE; number = e->nodes[number].parent) {
-        umb_node *node = &e->nodes[number];
+    for (; number != UMB_NONE; number = e->tree.nodes[number].parent) {
+        umb_node *node = &e->tree.nodes[number];
         uint32_t layers = 0;
         for (uint32_t slot = 0; slot < node->count; ++slot) {
-            layers |= umb_ref_layers(e->scene, e->nodes, node->ref[slot]);
+            layers |= umb_ref_layers(e->scene, e->tree.nodes, node->ref[slot]);
         }
         if (layers == node->layers) {
             return;
@@ -427,7 +414,7 @@ void umb_tree_edit_relayer(umb_tree_edit *e)
     const umb_committed *scene = e->scene;
     for (uint32_t i = 0; i < scene->moved_count && scene->remasked_count > 0; ++i) {
         uint32_t id = scene->moved[i];
-        for (uint32_t place = scene->objects[id].remasked ? e->places[id] : UMB_NONE; place != UMB_NONE;
+        for (uint32_t place = scene->objects[id].remasked ? e->tree.places[id] : UMB_NONE; place != UMB_NONE;
              place = e->next != NULL ? e->next[place] : UMB_NONE) {
             relayer(e, place / UMB_NODE_WIDTH);
         }
@@ -441,12 +428,11 @@ void umb_tree_edit_relayer(umb_tree_edit *e)
 
 static void link_all(umb_tree_edit *e)
 {
-    forget_places(e->places, e->place_capacity);
-    forget_places(e->occluder_places, e->occluder_capacity);
-    for (uint32_t k = e->node_count; k-- > 0;) {
-        for (uint32_t slot = 0; slot < e->nodes[k].count; ++slot) {
-            if ((e->nodes[k].ref[slot] & UMB_REF_KIND) != UMB_REF_NODE) {
-                umb_tree_edit_link(e, e->nodes[k].ref[slot], k * UMB_NODE_WIDTH + slot);
+    umb_tree_stock_forget_places(&e->tree);
+    for (uint32_t k = e->tree.node_count; k-- > 0;) {
+        for (uint32_t slot = 0; slot < e->tree.nodes[k].count; ++slot) {
+            if ((e->tree.nodes[k].ref[slot] & UMB_REF_KIND) != UMB_REF_NODE) {
+                umb_tree_edit_link(e, e->tree.nodes[k].ref[slot], k * UMB_NODE_WIDTH + slot);
             }
         }
     }
@@ -457,7 +443,7 @@ static void renumber_set(umb_number_set *set, const umb_tree_edit *e, const umb_
 {
     for (uint32_t k = umb_number_set_next(set, 0); k != UMB_NONE; k = umb_number_set_next(set, k + 1)) {
         umb_number_set_remove(set, k);
-        if (k < e->node_count && !umb_number_set_has(&e->free, k)) {
+        if (k < e->tree.node_count && !umb_number_set_has(&e->free, k)) {
             umb_number_set_add(set, to[k].first); /* no higher than k: it is not met again */
         }
     }
@@ -465,33 +451,33 @@ static void renumber_set(umb_number_set *set, const umb_tree_edit *e, const umb_
 
 bool umb_tree_edit_close_gaps(umb_tree_edit *e, umb_number_set *set)
 {
-    if (e->free.count <= e->node_count / 2 + LEAST_GAPS) {
+    if (e->free.count <= e->tree.node_count / 2 + LEAST_GAPS) {
         return false;
     }
-    umb_range *to = e->below; /* lists are stale afterwards: there is room for the new numbers */
+    umb_range *to = e->tree.below; /* lists are stale afterwards: there is room for the new numbers */
     uint32_t next = 0;
-    for (uint32_t k = 0; k < e->node_count; ++k) { /* parents before children */
+    for (uint32_t k = 0; k < e->tree.node_count; ++k) { /* parents before children */
         if (umb_number_set_has(&e->free, k)) {
             continue;
         }
-        umb_node node = e->nodes[k];
+        umb_node node = e->tree.nodes[k];
         if (node.parent != UMB_NONE) {
             node.parent = to[node.parent].first;
-            e->nodes[node.parent].ref[node.slot] = next;
+            e->tree.nodes[node.parent].ref[node.slot] = next;
         }
         to[k].first = next;
         if (e->volumes != NULL) {
             e->volumes->list[next] = e->volumes->list[k];
         }
-        e->nodes[next++] = node;
+        e->tree.nodes[next++] = node;
     }
     renumber_set(set, e, to);
-    e->node_count = next;
+    e->tree.node_count = next;
     umb_number_set_clear(&e->free);
     for (uint32_t k = 0; k < next; ++k) {
-        e->below[k].count = UMB_RANGE_STALE;
+        e->tree.below[k].count = UMB_RANGE_STALE;
     }
-    e->stale += e->slot_count;
+    e->stale += e->tree.slot_count;
     e->touched_count = UMB_TOUCHED_ALL;
     link_all(e);
     return true;
@@ -509,18 +495,18 @@ float umb_tree_edit_area(const umb_node *node)
 /* Counts, places and marks of a tree just built. Children come after their parents. */
 void umb_tree_edit_learn(umb_tree_edit *e)
 {
-    e->slot_count = 0;
-    for (uint32_t k = e->node_count; k-- > 0;) {
-        umb_node *node = &e->nodes[k];
+    e->tree.slot_count = 0;
+    for (uint32_t k = e->tree.node_count; k-- > 0;) {
+        umb_node *node = &e->tree.nodes[k];
         node->items = node->edits = node->layers = 0;
         for (uint32_t slot = 0; slot < node->count; ++slot) {
             uint32_t ref = node->ref[slot];
-            node->layers |= umb_ref_layers(e->scene, e->nodes, ref);
+            node->layers |= umb_ref_layers(e->scene, e->tree.nodes, ref);
             if ((ref & UMB_REF_KIND) == UMB_REF_NODE) {
-                node->items += e->nodes[ref].items;
+                node->items += e->tree.nodes[ref].items;
             } else {
                 node->items += 1;
-                e->slot_count += 1;
+                e->tree.slot_count += 1;
                 umb_tree_edit_link(e, ref, k * UMB_NODE_WIDTH + slot);
             }
         }
@@ -538,14 +524,14 @@ bool umb_tree_edit_adopt(umb_tree_edit *e, umb_node *nodes, uint32_t node_count,
                          const umb_committed *scene)
 {
     const umb_allocator *a = e->allocator;
-    umb_tree_edit old = *e;
-    e->node_capacity = node_capacity;
+    size_t old_capacity = e->tree.node_capacity;
+    e->tree.node_capacity = node_capacity;
     size_t next = several ? node_capacity * UMB_NODE_WIDTH : 0;
     if (!umb_memory_reserve(a, (void **)&e->next, &e->next_capacity, next, sizeof *e->next) || !reserve_beside(e) ||
         !umb_tree_edit_reserve_places(e, scene) ||
         !umb_memory_reserve(a, (void **)&e->worn, &e->worn_capacity, MOST_WORN, sizeof *e->worn) ||
         !umb_memory_reserve(a, (void **)&e->touched, &e->touched_capacity, MOST_TOUCHED, sizeof *e->touched)) {
-        e->node_capacity = old.node_capacity;
+        e->tree.node_capacity = old_capacity;
         return false;
     }
     if (!several && e->next != NULL) {
@@ -554,13 +540,11 @@ bool umb_tree_edit_adopt(umb_tree_edit *e, umb_node *nodes, uint32_t node_count,
         e->next_capacity = 0;
     }
     e->scene = scene;
-    e->nodes = nodes;
-    e->node_count = node_count;
+    e->tree.nodes = nodes;
+    e->tree.node_count = node_count;
     e->room = node_capacity;
     umb_number_set_clear(&e->free);
-    umb_bvh_marks_clear(&e->marks);
-    forget_places(e->places, e->place_capacity);
-    forget_places(e->occluder_places, e->occluder_capacity);
+    umb_tree_stock_forget(&e->tree);
     e->worn_count = 0;
     e->touched_count = UMB_TOUCHED_ALL;
     e->stale = 0;
@@ -574,86 +558,37 @@ bool umb_tree_edit_adopt(umb_tree_edit *e, umb_node *nodes, uint32_t node_count,
 
 /* ---- exchange ------------------------------------------------------------------------------- */
 
-void umb_tree_stock_free(umb_tree_stock *s, const umb_allocator *a)
-{
-    umb_memory_free(a, s->nodes, s->node_capacity * sizeof *s->nodes);
-    umb_memory_free(a, s->below, s->below_capacity * sizeof *s->below);
-    umb_memory_free(a, s->places, s->place_capacity * sizeof *s->places);
-    umb_memory_free(a, s->occluder_places, s->occluder_capacity * sizeof *s->occluder_places);
-    umb_bvh_marks_free(&s->marks, a);
-    *s = (umb_tree_stock){0};
-}
-
-size_t umb_tree_stock_memory(const umb_tree_stock *s)
-{
-    return s->node_capacity * sizeof *s->nodes + s->below_capacity * sizeof *s->below +
-           (s->place_capacity + s->occluder_capacity) * sizeof(uint32_t) + umb_bvh_marks_memory(&s->marks);
-}
-
-void umb_tree_stock_forget(umb_tree_stock *s)
-{
-    forget_places(s->places, s->place_capacity);
-    forget_places(s->occluder_places, s->occluder_capacity);
-    umb_bvh_marks_clear(&s->marks);
-}
-
 bool umb_tree_edit_exchange(umb_tree_edit *e, umb_tree_stock *stock, const umb_committed *scene)
 {
-    umb_tree_stock old = {.nodes = e->nodes,
-                          .below = e->below,
-                          .marks = e->marks,
-                          .places = e->places,
-                          .occluder_places = e->occluder_places,
-                          .node_capacity = e->node_capacity,
-                          .below_capacity = e->below_capacity,
-                          .place_capacity = e->place_capacity,
-                          .occluder_capacity = e->occluder_capacity,
-                          .node_count = e->node_count,
-                          .slot_count = e->slot_count};
-    e->nodes = stock->nodes;
-    e->below = stock->below;
-    e->marks = stock->marks;
-    e->places = stock->places;
-    e->occluder_places = stock->occluder_places;
-    e->node_capacity = stock->node_capacity;
-    e->below_capacity = stock->below_capacity;
-    e->place_capacity = stock->place_capacity;
-    e->occluder_capacity = stock->occluder_capacity;
-    e->node_count = stock->node_count;
-    e->slot_count = stock->slot_count;
+    umb_tree_stock old = e->tree;
+    e->tree = *stock;
     *stock = old;
     umb_number_set_clear(&e->free);
     e->worn_count = 0;
     e->touched_count = UMB_TOUCHED_ALL;
     e->stale = 0;
     e->failed = !reserve_beside(e) || !umb_tree_edit_reserve_places(e, scene);
-    e->room = e->node_capacity;
+    e->room = e->tree.node_capacity;
     return !e->failed;
 }
 
 void umb_tree_edit_free(umb_tree_edit *e)
 {
     const umb_allocator *a = e->allocator;
-    umb_memory_free(a, e->nodes, e->node_capacity * sizeof *e->nodes);
-    umb_memory_free(a, e->below, e->below_capacity * sizeof *e->below);
-    umb_memory_free(a, e->places, e->place_capacity * sizeof *e->places);
-    umb_memory_free(a, e->occluder_places, e->occluder_capacity * sizeof *e->occluder_places);
+    umb_tree_stock_free(&e->tree, a);
     umb_memory_free(a, e->next, e->next_capacity * sizeof *e->next);
     umb_memory_free(a, e->items, e->item_capacity * sizeof *e->items);
     umb_memory_free(a, e->splits, e->split_capacity * sizeof *e->splits);
     umb_memory_free(a, e->numbers, e->number_capacity * sizeof *e->numbers);
     umb_memory_free(a, e->worn, e->worn_capacity * sizeof *e->worn);
     umb_memory_free(a, e->touched, e->touched_capacity * sizeof *e->touched);
-    umb_bvh_marks_free(&e->marks, a);
     umb_number_set_free(&e->free, a);
     *e = (umb_tree_edit){.allocator = a};
 }
 
 size_t umb_tree_edit_memory(const umb_tree_edit *e)
 {
-    return e->node_capacity * sizeof *e->nodes + e->below_capacity * sizeof *e->below +
-           (e->place_capacity + e->occluder_capacity + e->next_capacity + e->number_capacity + e->worn_capacity +
-            e->touched_capacity) * sizeof(uint32_t) +
-           e->item_capacity * sizeof *e->items + e->split_capacity * sizeof *e->splits +
-           umb_bvh_marks_memory(&e->marks) + umb_number_set_memory(&e->free);
+    return umb_tree_stock_memory(&e->tree) +
+           (e->next_capacity + e->number_capacity + e->worn_capacity + e->touched_capacity) * sizeof(uint32_t) +
+           e->item_capacity * sizeof *e->items + e->split_capacity * sizeof *e->splits + umb_number_set_memory(&e->free);
 }

@@ -10,6 +10,7 @@
 #include "base/number_set.h"
 #include "scene/mask.h"
 #include "node_volume.h"
+#include "tree_stock.h"
 
 /* In umb_node.edits: the node is in the list of worn ones. */
 #define UMB_EDITS_WORN 0x80000000u
@@ -18,15 +19,9 @@
 typedef struct umb_tree_edit {
     const umb_allocator *allocator;
     const umb_committed *scene; /* whose items these are */
-    umb_node *nodes;
-    uint32_t node_count; /* numbers up to here are in use or free */
-    uint32_t slot_count; /* that name items */
-    umb_number_set free; /* node numbers */
-    umb_bvh_marks marks;
-    umb_range *below;
+    umb_tree_stock tree;
+    umb_number_set free;       /* node numbers */
     umb_node_volumes *volumes; /* NULL: none are wanted */
-    uint32_t *places;          /* of each object: 8 * node + slot, the first of them */
-    uint32_t *occluder_places; /* of each stand-alone occluder, by number */
     uint32_t *next;            /* places of items that have several (umb_bvh_find_places); NULL: none has */
     /* For a subtree that is made anew, and to find which. */
     umb_bvh_item *items;
@@ -39,8 +34,7 @@ typedef struct umb_tree_edit {
     uint32_t *touched;
     uint32_t touched_count;
     size_t touched_capacity;
-    size_t node_capacity, below_capacity, mark_capacity, place_capacity, occluder_capacity, next_capacity;
-    size_t item_capacity, split_capacity, number_capacity, worn_capacity;
+    size_t next_capacity, item_capacity, split_capacity, number_capacity, worn_capacity;
     size_t room;    /* nodes that all arrays have room for */
     uint64_t stale; /* edits since the lists of objects were made */
     bool wears;     /* edits count: subtrees are to be made anew after many */
@@ -51,20 +45,6 @@ typedef struct umb_tree_edit {
  * tree to tree. Items are found by themselves. False without memory; the nodes are then still the caller's. */
 bool umb_tree_edit_adopt(umb_tree_edit *e, umb_node *nodes, uint32_t node_count, size_t node_capacity, bool several,
                          const umb_committed *scene);
-/* What makes a tree, without what changing it needs. */
-typedef struct umb_tree_stock {
-    umb_node *nodes;
-    umb_range *below;
-    umb_bvh_marks marks;
-    uint32_t *places, *occluder_places;
-    size_t node_capacity, below_capacity, place_capacity, occluder_capacity;
-    uint32_t node_count, slot_count;
-} umb_tree_stock;
-
-void umb_tree_stock_free(umb_tree_stock *stock, const umb_allocator *a);
-size_t umb_tree_stock_memory(const umb_tree_stock *stock);
-/* Nothing is anywhere, and no node is marked. */
-void umb_tree_stock_forget(umb_tree_stock *stock);
 /* Change places with what makes another tree, in which no item has several places and no number is free. Marks and lists come
  * with it; volumes do not. False without memory: the tree has failed. */
 bool umb_tree_edit_exchange(umb_tree_edit *e, umb_tree_stock *stock, const umb_committed *scene);
@@ -79,8 +59,7 @@ bool umb_tree_edit_reserve_places(umb_tree_edit *e, const umb_committed *scene);
 /* Where an item is, the first of its places if there are several; UMB_NONE: nowhere. */
 static inline uint32_t umb_tree_edit_place(const umb_tree_edit *e, uint32_t ref)
 {
-    uint32_t number = ref & UMB_REF_NUMBER;
-    return (ref & UMB_REF_KIND) == UMB_REF_OBJECT ? e->places[number] : e->occluder_places[number];
+    return *umb_tree_stock_place(&e->tree, ref);
 }
 
 /* Room for so many nodes in all. False without memory. */

@@ -17,7 +17,7 @@
 bool umb_update_is_small(const umb_tree_edit *e, const umb_committed *scene, bool structure)
 {
     uint64_t changes = structure ? (uint64_t)scene->came_count + scene->went_count + scene->replaced_count : 0;
-    return changes * CHANGE_COST <= e->slot_count;
+    return changes * CHANGE_COST <= e->tree.slot_count;
 }
 
 /* ---- what goes and comes -------------------------------------------------------------------- */
@@ -28,7 +28,7 @@ static void take_away(umb_tree_edit *e, const umb_committed *scene)
         umb_tree_edit_remove(e, UMB_REF_OBJECT | scene->went[i], UMB_NONE);
     }
     for (uint32_t i = 0; i < scene->replaced_count; ++i) {
-        if (scene->replaced[i] < e->occluder_capacity) {
+        if (scene->replaced[i] < e->tree.occluder_capacity) {
             umb_tree_edit_remove(e, UMB_REF_OCCLUDER | scene->replaced[i], UMB_NONE);
         }
     }
@@ -98,7 +98,7 @@ static void push_up(umb_updater *u, umb_tree_edit *e, uint32_t ref, const umb_aa
     if (ancestor == UMB_NONE) {
         return;
     }
-    if (e->node_count > 0 && umb_number_set_reserve(&u->raised, e->allocator, (uint32_t)e->node_capacity) &&
+    if (e->tree.node_count > 0 && umb_number_set_reserve(&u->raised, e->allocator, (uint32_t)e->tree.node_capacity) &&
         umb_tree_edit_hold(e, ancestor, box, ref)) {
         umb_number_set_add(&u->raised, ancestor);
     } else {
@@ -132,8 +132,8 @@ static void move_object(umb_updater *u, umb_tree_edit *e, uint32_t ref, const um
 
 static inline __attribute__((always_inline)) void fetch(const umb_tree_edit *e, uint32_t object)
 {
-    uint32_t place = e->places[object];
-    const umb_node *node = &e->nodes[place != UMB_NONE ? place / UMB_NODE_WIDTH : 0];
+    uint32_t place = e->tree.places[object];
+    const umb_node *node = &e->tree.nodes[place != UMB_NONE ? place / UMB_NODE_WIDTH : 0];
     __builtin_prefetch(node->min, 1);
     __builtin_prefetch(node->min[2], 1);
     __builtin_prefetch(node->max[1], 1);
@@ -143,7 +143,7 @@ static inline __attribute__((always_inline)) void fetch(const umb_tree_edit *e, 
 /* True if a node grows little when one of its items has another box. */
 static bool fits(const umb_tree_edit *e, uint32_t place, const umb_aabb *box)
 {
-    const umb_node *node = &e->nodes[place / UMB_NODE_WIDTH];
+    const umb_node *node = &e->tree.nodes[place / UMB_NODE_WIDTH];
     umb_aabb whole = umb_node_bounds(node), with = whole;
     for (int i = 0; i < 3; ++i) {
         with.min[i] = box->min[i] < with.min[i] ? box->min[i] : with.min[i];
@@ -159,7 +159,7 @@ static void place_volumes(umb_tree_edit *e, const umb_committed *scene)
     for (uint32_t i = 0; i < scene->moved_count && !e->failed; ++i) {
         uint32_t id = scene->moved[i];
         const umb_object *o = &scene->objects[id];
-        if (o->mover != UMB_NONE && !o->exact && e->places[id] != UMB_NONE && !fits(e, e->places[id], &o->bounds)) {
+        if (o->mover != UMB_NONE && !o->exact && e->tree.places[id] != UMB_NONE && !fits(e, e->tree.places[id], &o->bounds)) {
             move_below_ancestor(e, UMB_REF_OBJECT | id, &o->bounds);
         }
     }
@@ -172,7 +172,7 @@ static void move_all(umb_updater *u, umb_tree_edit *e, const umb_committed *scen
         place_volumes(e, scene);
     }
     if (refits && e->next == NULL) {
-        umb_bvh_refit_moved(e->nodes, &e->marks, e->places, scene, e->volumes);
+        umb_bvh_refit_moved(e->tree.nodes, &e->tree.marks, e->tree.places, scene, e->volumes);
         return;
     }
     for (uint32_t i = 0; i < scene->moved_count && !e->failed; ++i) {
@@ -180,7 +180,7 @@ static void move_all(umb_updater *u, umb_tree_edit *e, const umb_committed *scen
         if (i + AHEAD < scene->moved_count) {
             fetch(e, scene->moved[i + AHEAD]);
         }
-        if (e->places[id] != UMB_NONE) {
+        if (e->tree.places[id] != UMB_NONE) {
             move_object(u, e, UMB_REF_OBJECT | id, &scene->objects[id].bounds);
         }
     }
@@ -206,8 +206,8 @@ static bool is_whole(const umb_tree_edit *e, uint32_t ref)
  * stays. */
 static void push_down(umb_tree_edit *e, uint32_t number)
 {
-    for (uint32_t slot = e->nodes[number].count; slot-- > 0 && has_children(&e->nodes[number]) && !e->failed;) {
-        const umb_node *node = &e->nodes[number];
+    for (uint32_t slot = e->tree.nodes[number].count; slot-- > 0 && has_children(&e->tree.nodes[number]) && !e->failed;) {
+        const umb_node *node = &e->tree.nodes[number];
         if (!umb_slot_is_node(node, slot) && is_whole(e, node->ref[slot])) {
             umb_aabb box = umb_slot_box(node, slot);
             uint32_t ref = node->ref[slot];
@@ -224,11 +224,11 @@ static void push_down_opened(umb_updater *u, umb_tree_edit *e)
     if (u->raised.count == 0) {
         return;
     }
-    for (uint32_t k = umb_number_set_next(&u->raised, 0); k < e->node_count && !e->failed;
+    for (uint32_t k = umb_number_set_next(&u->raised, 0); k < e->tree.node_count && !e->failed;
          k = umb_number_set_next(&u->raised, k + 1)) {
         if ((u->opened[k >> 6] >> (k & 63) & 1u) != 0) {
             umb_number_set_remove(&u->raised, k);
-            if (e->nodes[k].count > 0) {
+            if (e->tree.nodes[k].count > 0) {
                 push_down(e, k);
             }
         }
@@ -241,9 +241,9 @@ bool umb_update_reserve(umb_updater *u, const umb_tree_edit *e)
     if (u->strategy != UMB_UPDATE_LAZY) {
         return true;
     }
-    return umb_memory_reserve_zero(e->allocator, (void **)&u->opened, &u->opened_capacity, e->node_capacity / 64 + 1,
+    return umb_memory_reserve_zero(e->allocator, (void **)&u->opened, &u->opened_capacity, e->tree.node_capacity / 64 + 1,
                                    sizeof *u->opened) &&
-           umb_number_set_reserve(&u->raised, e->allocator, (uint32_t)e->node_capacity);
+           umb_number_set_reserve(&u->raised, e->allocator, (uint32_t)e->tree.node_capacity);
 }
 
 size_t umb_update_memory(const umb_updater *u)
@@ -282,7 +282,7 @@ bool umb_update_follow(umb_updater *u, umb_tree_edit *e, const umb_committed *sc
     if (e->failed || !umb_update_reserve(u, e)) {
         return false;
     }
-    umb_bvh_lift_marked(e->nodes, &e->marks, e->volumes);
+    umb_bvh_lift_marked(e->tree.nodes, &e->tree.marks, e->volumes);
     if (umb_tree_edit_close_gaps(e, &u->raised) && u->opened_capacity > 0) {
         memset(u->opened, 0, u->opened_capacity * sizeof *u->opened);
     }

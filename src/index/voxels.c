@@ -102,17 +102,17 @@ static bool same(const voxel *a, const voxel *b)
 /* The child of a node that is a cell, made if it is not there. UMB_NONE without memory. */
 static uint32_t child(umb_tree_edit *e, uint32_t number, uint32_t cell, const umb_aabb *box)
 {
-    umb_node *node = &e->nodes[number];
+    umb_node *node = &e->tree.nodes[number];
     for (uint32_t slot = 0; slot < node->count; ++slot) {
-        if (umb_slot_is_node(node, slot) && e->nodes[node->ref[slot]].cell == cell) {
+        if (umb_slot_is_node(node, slot) && e->tree.nodes[node->ref[slot]].cell == cell) {
             umb_slot_grow(node, slot, box);
-            umb_bvh_mark(&e->marks, number);
+            umb_bvh_mark(&e->tree.marks, number);
             return node->ref[slot];
         }
     }
     uint32_t made = umb_tree_edit_new_node(e, number);
     if (made != UMB_NONE) {
-        e->nodes[made].cell = cell;
+        e->tree.nodes[made].cell = cell;
         umb_tree_edit_put(e, number, box, made);
     }
     return made;
@@ -120,12 +120,12 @@ static uint32_t child(umb_tree_edit *e, uint32_t number, uint32_t cell, const um
 
 static uint32_t root_of(umb_tree_edit *e)
 {
-    if (e->node_count > 0) {
+    if (e->tree.node_count > 0) {
         return 0;
     }
     uint32_t root = umb_tree_edit_new_node(e, UMB_NONE);
     if (root != UMB_NONE) {
-        e->nodes[root].cell = CELL_ROOT;
+        e->tree.nodes[root].cell = CELL_ROOT;
     }
     return root;
 }
@@ -151,7 +151,7 @@ void umb_voxels_insert(const umb_voxels *v, umb_tree_edit *e, const umb_aabb *bo
 void umb_voxels_move(const umb_voxels *v, umb_tree_edit *e, const umb_aabb *box, uint32_t ref)
 {
     uint32_t place = umb_tree_edit_place(e, ref);
-    umb_aabb old = umb_slot_box(&e->nodes[place / UMB_NODE_WIDTH], place % UMB_NODE_WIDTH);
+    umb_aabb old = umb_slot_box(&e->tree.nodes[place / UMB_NODE_WIDTH], place % UMB_NODE_WIDTH);
     voxel from = voxel_of(v, &old), to = voxel_of(v, box);
     if (same(&from, &to)) {
         umb_tree_edit_set_box(e, ref, box);
