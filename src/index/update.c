@@ -11,6 +11,12 @@
 #define MOST_RENEWED 4096
 /* A node that a new volume makes larger than so many times its size is not where it belongs. */
 #define MOST_GROWTH 2.0
+/* Moves are few if there is one for so many items at most. */
+#define FEW 16
+/* A node is not where it belongs once one of few that move has made it so many times as large as it was made. One
+ * in so many is looked at each commit, in turn. */
+#define MOST_STRAYED 2.0
+#define TURNS 4
 /* How many moves ahead nodes are asked for: all that is looked at before is in the caches. */
 #define AHEAD 8
 
@@ -165,11 +171,74 @@ static void place_volumes(umb_tree_edit *e, const umb_committed *scene)
     }
 }
 
+/* True if a node with an item's new box is much larger than when it was made. */
+static bool has_strayed(umb_tree_edit *e, uint32_t number, const umb_aabb *box)
+{
+    umb_node *node = &e->tree.nodes[number];
+    umb_node_pad(node);
+    umb_aabb whole = umb_node_bounds(node);
+    umb_aabb_grow(&whole, box);
+    return umb_half_area(whole.min, whole.max) > MOST_STRAYED * (double)node->built;
+}
+
+/* The boxes from a node up to and without another, exactly. */
+static void shrink(umb_tree_edit *e, uint32_t number, uint32_t under)
+{
+    for (uint32_t parent; number != under; number = parent) {
+        umb_node_pad(&e->tree.nodes[number]);
+        umb_aabb box = umb_node_bounds(&e->tree.nodes[number]);
+        parent = e->tree.nodes[number].parent;
+        umb_slot_set_box(&e->tree.nodes[parent], e->tree.nodes[number].slot, &box);
+        umb_bvh_mark(&e->tree.marks, parent);
+    }
+}
+
+/* Out of its node, and below the first one above that holds it. The boxes that it has made large shrink first, or what it leaves
+ * would be found to be the cheapest place for it. */
+static void place_stray(umb_tree_edit *e, uint32_t ref, const umb_aabb *box)
+{
+    uint32_t place = umb_tree_edit_place(e, ref), node = place / UMB_NODE_WIDTH, slot = place % UMB_NODE_WIDTH;
+    if (e->tree.nodes[node].parent == UMB_NONE) {
+        return; /* the root is where everything belongs */
+    }
+    uint32_t ancestor = umb_tree_edit_holder(e, e->tree.nodes[node].parent, box);
+    umb_aabb other = umb_slot_box(&e->tree.nodes[node], slot == 0 ? 1 : 0);
+    umb_slot_set_box(&e->tree.nodes[node], slot, &other);
+    shrink(e, node, ancestor);
+    umb_tree_edit_remove(e, ref, ancestor);
+    umb_tree_edit_insert(e, UMB_WAY_CHEAPEST, ancestor, ancestor, box, ref);
+    umb_tree_edit_tidy(e, ancestor, UMB_NONE);
+    if (!e->failed) {
+        umb_node *in = &e->tree.nodes[umb_tree_edit_place(e, ref) / UMB_NODE_WIDTH];
+        umb_node_pad(in);
+        in->built = in->built > 0.0f ? in->built : umb_tree_edit_area(in); /* 0: it was made for this one */
+    }
+}
+
+/* Where few move, they go far from those that they were put beside before there are changes enough for a new tree, and make boxes
+ * as long as their ways. Each is put elsewhere once its node has grown: one such commit in twenty or so, for each of them. */
+static void place_strays(umb_tree_edit *e, const umb_committed *scene)
+{
+    for (uint32_t i = (uint32_t)(scene->version % TURNS); i < scene->moved_count && !e->failed; i += TURNS) {
+        uint32_t id = scene->moved[i];
+        if (i + AHEAD * TURNS < scene->moved_count) {
+            fetch(e, scene->moved[i + AHEAD * TURNS]);
+        }
+        if (e->tree.places[id] != UMB_NONE &&
+            has_strayed(e, e->tree.places[id] / UMB_NODE_WIDTH, &scene->objects[id].bounds)) {
+            place_stray(e, UMB_REF_OBJECT | id, &scene->objects[id].bounds);
+        }
+    }
+}
+
 static void move_all(umb_updater *u, umb_tree_edit *e, const umb_committed *scene)
 {
-    bool refits = u->strategy == UMB_UPDATE_REFIT || u->strategy == UMB_UPDATE_INCREMENTAL;
-    if (u->strategy == UMB_UPDATE_INCREMENTAL && scene->motion.count > 0) {
+    bool incremental = u->strategy == UMB_UPDATE_INCREMENTAL, refits = u->strategy == UMB_UPDATE_REFIT || incremental;
+    if (incremental && scene->motion.count > 0) {
         place_volumes(e, scene);
+    }
+    if (incremental && e->next == NULL && (uint64_t)scene->moved_count * FEW <= e->tree.slot_count) {
+        place_strays(e, scene);
     }
     if (refits && e->next == NULL) {
         umb_bvh_refit_moved(e->tree.nodes, &e->tree.marks, e->tree.places, scene, e->volumes);
