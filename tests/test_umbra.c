@@ -249,13 +249,16 @@ static void check_rays(double hu, double hv, double outer, uint64_t seed)
 {
     umb_allocator a = umb_memory_allocator(NULL);
     dice d = {seed};
-    umb_ray_frame frames[4] = {{hu, hv, -1, 1, {0, 0, 0}, 0, 1, 2, 1, 0, INFINITY}, {hu, hv, -1, 1, {0, 0, 0}, 0, 1, 2, -1, 0, INFINITY},
-                               {hv, hu, -1, 1, {0, 0, 0}, 1, 0, 2, 1, 0, INFINITY}, {hv, hu, -1, 1, {0, 0, 0}, 1, 0, 2, -1, 0, INFINITY}};
+    umb_ray_frame frames[4] = {{hu, hv, -1, 1, {0, 0, 0}, 0, 1, 2, 1, 0, INFINITY},
+                               {hu, hv, -1, 1, {0, 0, 0}, 0, 1, 2, -1, 0, INFINITY},
+                               {hv, hu, -1, 1, {0, 0, 0}, 1, 0, 2, 1, 0, INFINITY},
+                               {hv, hu, -1, 1, {0, 0, 0}, 1, 0, 2, -1, 0, INFINITY}};
     umb_ray_map maps[8] = {0};
     uint32_t count = outer == 0.0 ? 4 : 8;
     for (uint32_t k = 0; k < count; ++k) {
         umb_ray_kind kind = outer == 0.0 ? UMB_RAY_SLAB : k < 4 ? UMB_RAY_NEAR : UMB_RAY_FAR;
-        assert_int_equal(umb_ray_map_begin(&maps[k], &a, &frames[k % 4], &(umb_ray_layout){kind, outer, kind == UMB_RAY_SLAB ? 24 : 64, 64, 1}), UMB_OK);
+        umb_ray_layout layout = {kind, outer, kind == UMB_RAY_SLAB ? 24 : 64, 64, 1};
+        assert_int_equal(umb_ray_map_begin(&maps[k], &a, &frames[k % 4], &layout), UMB_OK);
     }
     for (uint32_t i = 0; i < (is_small() ? 2000u : 20000u); ++i) {
         double from[3] = {between(&d, -hu, hu), between(&d, -hv, hv), 0}, angle = between(&d, 0, 6.283185307179586);
@@ -308,7 +311,8 @@ static void draw_bodies(const umb_umbra_kernels *kernels, umb_ray_map *m, bool h
         b.ring = b.convex ? 0 : 4;
         for (uint32_t c = 0; c < b.count; ++c) {
             double side = b.convex ? (c & 1) : (c == 1 || c == 2), up = b.convex ? (c >> 1 & 1) : c > 1;
-            b.vertices[c] = (umb_ray_point){u + 3 * (double)(c >> 2) + between(&d, 0, 1), v + 6 * side, half ? 9 * up - 1 : z + 3 * up};
+            double along = u + 3 * (double)(c >> 2) + between(&d, 0, 1);
+            b.vertices[c] = (umb_ray_point){along, v + 6 * side, half ? 9 * up - 1 : z + 3 * up};
             b.on_floor[c] = half && up == 0.0;
         }
         umb_ray_map_block(m, kernels, &b, half);

@@ -124,18 +124,7 @@ const uint32_t *oracle_neighbours(truth *t, uint32_t mesh)
 static int facing(const search *s, float v[3][3])
 {
     const umb_view *view = s->view.view;
-    double e[3], f[3], sum = 0.0;
-    for (int i = 0; i < 3; ++i) {
-        e[i] = (double)v[1][i] - v[0][i];
-        f[i] = (double)v[2][i] - v[0][i];
-    }
-    for (int i = 0; i < 3; ++i) {
-        int j = (i + 1) % 3, k = (i + 2) % 3;
-        double along = view->projection == UMB_PERSPECTIVE ? v[0][i] - view->eye[i]
-                                                           : view->forward[i];
-        sum += (e[j] * f[k] - e[k] * f[j]) * along;
-    }
-    return sum < 0.0 ? -1 : sum > 0.0;
+    return view->projection == UMB_PERSPECTIVE ? oracle_facing(v, view->eye) : oracle_facing_along(v, view->forward);
 }
 
 static double depth_of(const umb_view *view, const double p[3])

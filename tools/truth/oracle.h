@@ -132,6 +132,10 @@ void oracle_trace_ray(const truth *t, const oracle_view *v, const oracle_sight *
 /* Depth beyond near at which the line crosses the triangle's plane; fallback where it runs
  * along. */
 double oracle_plane_depth(float v[3][3], const oracle_sight *sight, double fallback, int *facing);
+/* Sign of the eye's side of a triangle, and of the side that is seen along a direction: -1 in front. In doubles: close to the plane
+ * it may be wrong. */
+int oracle_facing(float v[3][3], const double eye[3]);
+int oracle_facing_along(float v[3][3], const double along[3]);
 /* True if a triangle so met is shown by TRUTH_CULLING. */
 bool oracle_shown(uint8_t flags, int facing);
 

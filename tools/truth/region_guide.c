@@ -24,20 +24,6 @@ static double spread(uint64_t random, uint64_t which, double low, double high)
     return low * pow(high / low, unit(random, which));
 }
 
-int region_facing(const double eye[3], float v[3][3])
-{
-    double e[3], f[3], sum = 0.0;
-    for (int i = 0; i < 3; ++i) {
-        e[i] = (double)v[1][i] - v[0][i];
-        f[i] = (double)v[2][i] - v[0][i];
-    }
-    for (int i = 0; i < 3; ++i) {
-        int j = (i + 1) % 3, k = (i + 2) % 3;
-        sum += (e[j] * f[k] - e[k] * f[j]) * (v[0][i] - eye[i]);
-    }
-    return sum < 0.0 ? -1 : sum > 0.0;
-}
-
 static double distance(const double a[3], const double b[3])
 {
     double sum = 0.0;
@@ -254,7 +240,7 @@ void region_border_item(region_hand *hand, uint64_t item)
         return;
     }
     oracle_triangle(h->t, w->object, w->triangle, v);
-    int side = region_facing(w->eye, v);
+    int side = oracle_facing(v, w->eye);
     for (int i = 0; i < 3; ++i) {
         /* Corners 1 and 2 of mirrored objects are swapped: edge i of the mesh is edge 2 - i here. */
         int e = h->t->mirrored[w->object] ? 2 - i : i;
@@ -267,7 +253,7 @@ void region_border_item(region_hand *hand, uint64_t item)
                 try_neighbour(hand, w->eye, w->object, other, u, random);
             }
             /* Not in the outline from here, and most likely not from elsewhere. */
-            if (side != 0 && region_facing(w->eye, u) == side && (random & 7) != 0) {
+            if (side != 0 && oracle_facing(u, w->eye) == side && (random & 7) != 0) {
                 continue;
             }
         }

@@ -31,9 +31,6 @@ typedef struct region_find {
 
 struct region_hunt;
 
-/* Sign of the eye's side of a triangle: -1 in front. */
-int region_facing(const double eye[3], float v[3][3]);
-
 /* What one task of a block works with. */
 typedef struct region_hand {
     struct region_hunt *hunt;

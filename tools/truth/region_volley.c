@@ -71,7 +71,7 @@ static void aim(const region_hunt *h, volley *s, const double eye[3], uint32_t o
     for (uint32_t i = 0; i < REGION_VOLLEY; ++i) {
         uint64_t choice = oracle_mix(random, i, 52);
         if (i % 4 == 0) { /* four at a triangle; one that looks away hides itself */
-            for (uint64_t k = 0; k < 4 && (k == 0 || region_facing(eye, v) >= 0); ++k) {
+            for (uint64_t k = 0; k < 4 && (k == 0 || oracle_facing(v, eye) >= 0); ++k) {
                 s->triangles[i] = (uint32_t)(oracle_mix(choice, k, 53) % count);
                 oracle_triangle(h->t, object, s->triangles[i], v);
             }

@@ -102,6 +102,26 @@ static void cast_ray(const truth *t, const oracle_sight *sight, float start, flo
     ++c->trace->rays;
 }
 
+int oracle_facing_along(float v[3][3], const double along[3])
+{
+    double e[3], f[3], sum = 0.0;
+    for (int i = 0; i < 3; ++i) {
+        e[i] = (double)v[1][i] - v[0][i];
+        f[i] = (double)v[2][i] - v[0][i];
+    }
+    for (int i = 0; i < 3; ++i) {
+        int j = (i + 1) % 3, k = (i + 2) % 3;
+        sum += (e[j] * f[k] - e[k] * f[j]) * along[i];
+    }
+    return sum < 0.0 ? -1 : sum > 0.0;
+}
+
+int oracle_facing(float v[3][3], const double eye[3])
+{
+    double along[3] = {v[0][0] - eye[0], v[0][1] - eye[1], v[0][2] - eye[2]};
+    return oracle_facing_along(v, along);
+}
+
 double oracle_plane_depth(float v[3][3], const oracle_sight *sight, double fallback, int *facing)
 {
     double e[3], f[3], numerator = 0.0, denominator = 0.0, size = 0.0;

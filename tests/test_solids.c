@@ -1,0 +1,662 @@
+/* What the refinement stands on: which surfaces are solids, bodies inside them, segments that only touch a body, beams with a
+ * hole in what blocks them; against winding numbers, whole numbers and known holes. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "bake/beam.h"
+#include "bake/closed_solid.h"
+#include "bake/pieces.h"
+#include "bake/solid_inner.h"
+#include "geometry/transform.h"
+#include "scene/mesh.h"
+#include "support/ray_bodies.h"
+
+static uint32_t times(uint32_t small)
+{
+    const char *size = getenv("UMBRAGE_TEST_SIZE");
+    return size == NULL ? 4 * small : size[0] == 's' ? small : 40 * small;
+}
+
+/* ---- meshes -------------------------------------------------------------------------------------- */
+
+enum { MOST = 96 };
+
+/* Whole numbers, so that nothing of it is rounded. */
+typedef struct surface {
+    float points[MOST][3];
+    uint32_t faces[MOST][3];
+    uint8_t flags[MOST];
+    uint32_t point_count, face_count;
+} surface;
+
+static void add_face(surface *s, uint32_t a, uint32_t b, uint32_t c)
+{
+    assert_true(s->face_count < MOST);
+    memcpy(s->faces[s->face_count++], (uint32_t[3]){a, b, c}, sizeof s->faces[0]);
+}
+
+static void add_quad(surface *s, uint32_t a, uint32_t b, uint32_t c, uint32_t d)
+{
+    add_face(s, a, b, c);
+    add_face(s, a, c, d);
+}
+
+/* An upright prism over an outline that goes round to the left; tops are cut into triangles as said. */
+static void add_prism(surface *s, const int8_t (*outline)[2], uint32_t count, const uint8_t (*tops)[3], uint32_t top_count,
+                      const int shift[3], int height)
+{
+    uint32_t first = s->point_count;
+    for (uint32_t i = 0; i < 2 * count; ++i) {
+        float *p = s->points[s->point_count++];
+        p[0] = (float)(outline[i % count][0] + shift[0]);
+        p[1] = (float)(outline[i % count][1] + shift[1]);
+        p[2] = (float)((i < count ? 0 : height) + shift[2]);
+    }
+    for (uint32_t i = 0; i < count; ++i) {
+        uint32_t k = (i + 1) % count;
+        add_quad(s, first + i, first + k, first + count + k, first + count + i);
+    }
+    for (uint32_t i = 0; i < top_count; ++i) {
+        const uint8_t *t = tops[i];
+        add_face(s, first + count + t[0], first + count + t[1], first + count + t[2]);
+        add_face(s, first + t[0], first + t[2], first + t[1]);
+    }
+}
+
+typedef struct outline {
+    int8_t points[12][2];
+    uint32_t count;
+    uint8_t tops[10][3];
+    uint32_t top_count;
+} outline;
+
+static const outline SQUARE = {{{0, 0}, {8, 0}, {8, 8}, {0, 8}}, 4, {{0, 1, 2}, {0, 2, 3}}, 2};
+static const outline CORNER = {{{0, 0}, {12, 0}, {12, 4}, {4, 4}, {4, 12}, {0, 12}}, 6, {{0, 1, 3}, {1, 2, 3}, {0, 3, 5}, {3, 4, 5}}, 4};
+static const outline YARD = {{{0, 0}, {14, 0}, {14, 10}, {10, 10}, {10, 4}, {4, 4}, {4, 10}, {0, 10}}, 8,
+                             {{0, 1, 4}, {1, 2, 4}, {2, 3, 4}, {0, 4, 5}, {0, 5, 6}, {0, 6, 7}}, 6};
+static const outline ARROW = {{{0, 0}, {9, 3}, {0, 12}, {4, 4}}, 4, {{0, 1, 3}, {1, 2, 3}}, 2};
+static const outline BOW = {{{0, 0}, {9, 9}, {9, 0}, {0, 5}}, 4, {{0, 1, 2}, {0, 2, 3}}, 2}; /* crosses itself */
+
+static void add_outline(surface *s, const outline *o, const int shift[3], int height)
+{
+    add_prism(s, o->points, o->count, o->tops, o->top_count, shift, height);
+}
+
+static void turn_face(surface *s, uint32_t face)
+{
+    uint32_t other = s->faces[face][1];
+    s->faces[face][1] = s->faces[face][2];
+    s->faces[face][2] = other;
+}
+
+/* ---- occluders ------------------------------------------------------------------------------------ */
+
+typedef struct solid_case {
+    umb_allocator allocator;
+    umb_occluder occluder;
+    umb_mesh *mesh;
+    float points[MOST][3]; /* in the world, of the mesh */
+} solid_case;
+
+static void open_case(const surface *s, const umb_transform *t, bool mirrored, solid_case *out)
+{
+    umb_shape_def def = {.positions = &s->points[0][0], .position_count = s->point_count, .indices = &s->faces[0][0],
+                         .index_count = 3 * s->face_count, .triangle_flags = s->flags};
+    *out = (solid_case){.allocator = umb_memory_allocator(NULL)};
+    assert_int_equal(umb_mesh_create_occluder(&out->allocator, &def, &out->mesh), UMB_OK);
+    umb_occluder *o = &out->occluder;
+    *o = (umb_occluder){.mesh = out->mesh, .owner = UMB_NONE, .identity = t == NULL, .mirrored = mirrored};
+    o->bounds = (umb_aabb){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+    o->transform = t != NULL ? *t : o->transform;
+    for (uint32_t i = 0; i < out->mesh->position_count; ++i) {
+        float *p = out->points[i];
+        memcpy(p, out->mesh->positions[i], sizeof out->points[i]);
+        if (t != NULL) {
+            umb_transform_point(t, out->mesh->positions[i], p);
+        }
+        for (int k = 0; k < 3; ++k) {
+            o->bounds.min[k] = fminf(o->bounds.min[k], p[k]);
+            o->bounds.max[k] = fmaxf(o->bounds.max[k], p[k]);
+        }
+    }
+}
+
+static void close_case(solid_case *c)
+{
+    umb_mesh_destroy(&c->allocator, c->mesh);
+}
+
+static umb_transform draw_transform(dice *d, bool mirrored)
+{
+    double angle = dice_between(d, 0, 6.28), c = cos(angle), s = sin(angle), size = dice_between(d, 0.3, 3), lean = dice_between(d, -0.5, 0.5);
+    umb_transform t = {{{(float)(size * c), (float)(-size * s), 0, (float)dice_between(d, -50, 50)},
+                        {(float)(size * s), (float)(size * c), (float)lean, (float)dice_between(d, -50, 50)},
+                        {(float)lean, 0, (float)(mirrored ? -size : size), (float)dice_between(d, -50, 50)}}};
+    return t;
+}
+
+/* How often the surface goes round a point: whole but for rounding. */
+static double winding(const solid_case *c, const double x[3])
+{
+    double sum = 0.0;
+    for (uint32_t t = 0; t < c->mesh->triangle_count; ++t) {
+        double v[3][3], l[3], dots[3];
+        for (int i = 0; i < 3; ++i) {
+            for (int k = 0; k < 3; ++k) {
+                v[i][k] = c->points[c->mesh->triangles[t][i]][k] - x[k];
+            }
+            l[i] = sqrt(v[i][0] * v[i][0] + v[i][1] * v[i][1] + v[i][2] * v[i][2]);
+        }
+        for (int i = 0; i < 3; ++i) {
+            const double *a = v[i], *b = v[(i + 1) % 3];
+            dots[i] = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        }
+        double det = v[0][0] * (v[1][1] * v[2][2] - v[1][2] * v[2][1]) - v[0][1] * (v[1][0] * v[2][2] - v[1][2] * v[2][0]) +
+                     v[0][2] * (v[1][0] * v[2][1] - v[1][1] * v[2][0]);
+        sum += 2.0 * atan2(det, l[0] * l[1] * l[2] + dots[0] * l[2] + dots[1] * l[0] + dots[2] * l[1]);
+    }
+    return (c->occluder.mirrored ? -sum : sum) / (4.0 * 3.14159265358979323846);
+}
+
+static void point_in(dice *d, const umb_aabb *b, double out[3])
+{
+    for (int k = 0; k < 3; ++k) {
+        double size = (double)b->max[k] - b->min[k];
+        out[k] = b->min[k] + size * dice_between(d, -0.05, 1.05);
+    }
+}
+
+/* ---- which surfaces are solids --------------------------------------------------------------------- */
+
+enum { CUBE, L_SHAPE, U_SHAPE, DENTED, APART, SOLIDS, /* and those that are none: */
+       LACKING = SOLIDS, TURNED, INSIDE_OUT, CROSSING, HOLLOW, TWO_SIDED, SHARED_EDGE, CROSSED, FLAT, CASES };
+
+static void make_surface(int kind, surface *s)
+{
+    static const int none[3] = {0, 0, 0}, apart[3] = {20, 3, 1}, across[3] = {3, 2, 5}, inside[3] = {2, 1, 3}, beside[3] = {8, 8, 0};
+    static const outline small = {{{0, 0}, {3, 0}, {3, 3}, {0, 3}}, 4, {{0, 1, 2}, {0, 2, 3}}, 2};
+    const outline *first = kind == L_SHAPE ? &CORNER : kind == U_SHAPE ? &YARD : kind == DENTED ? &ARROW : kind == CROSSED ? &BOW : &SQUARE;
+    memset(s, 0, sizeof *s);
+    add_outline(s, first, none, kind == FLAT ? 0 : 7);
+    uint32_t faces = s->face_count;
+    if (kind == APART || kind == CROSSING || kind == SHARED_EDGE) {
+        add_outline(s, &SQUARE, kind == APART ? apart : kind == CROSSING ? across : beside, 7);
+    } else if (kind == HOLLOW) {
+        add_outline(s, &small, inside, 2);
+    }
+    for (uint32_t i = kind == HOLLOW ? faces : 0; i < s->face_count && (kind == HOLLOW || kind == INSIDE_OUT); ++i) {
+        turn_face(s, i);
+    }
+    if (kind == TURNED) {
+        turn_face(s, 5);
+    }
+    s->face_count -= kind == LACKING ? 1 : 0;
+    s->flags[3] = kind == TWO_SIDED ? UMB_TRIANGLE_TWO_SIDED : 0;
+}
+
+static void test_known_surfaces(void **state)
+{
+    (void)state;
+    dice d = {71};
+    for (int n = 0; n < 12 * CASES; ++n) {
+        surface s;
+        solid_case c;
+        bool mirrored = n / CASES % 2 == 1;
+        umb_transform t = draw_transform(&d, mirrored);
+        make_surface(n % CASES, &s);
+        open_case(&s, n < CASES ? NULL : &t, n >= CASES && mirrored, &c);
+        assert_int_equal(umb_closed_solid(&c.occluder, (const float(*)[3])c.points), n % CASES < SOLIDS);
+        close_case(&c);
+    }
+}
+
+/* Points of whole numbers moved at random: what is called a solid goes nowhere round a point the wrong way. */
+static void test_moved_surfaces(void **state)
+{
+    (void)state;
+    dice d = {72};
+    uint32_t solids = 0, others = 0;
+    for (uint32_t n = 0; n < times(2000); ++n) {
+        surface s;
+        solid_case c;
+        static const int kinds[] = {CUBE, L_SHAPE, U_SHAPE, DENTED, APART, CROSSED, CROSSING};
+        make_surface(kinds[n % 7], &s);
+        for (uint32_t i = dice_roll(&d, 4); i > 0; --i) {
+            s.points[dice_roll(&d, s.point_count)][dice_roll(&d, 3)] += (float)dice_roll(&d, 15) - 7.0f;
+        }
+        open_case(&s, NULL, false, &c);
+        if (!umb_closed_solid(&c.occluder, (const float(*)[3])c.points)) {
+            others += 1;
+        } else {
+            solids += 1;
+            for (int i = 0; i < 60; ++i) {
+                double x[3];
+                point_in(&d, &c.occluder.bounds, x);
+                assert_true(winding(&c, x) > -0.5);
+            }
+        }
+        close_case(&c);
+    }
+    assert_true(solids > 100 && others > 100);
+}
+
+/* ---- bodies inside ---------------------------------------------------------------------------------- */
+
+static double depth_in(const umb_solids *s, const umb_solid *b, const double x[3])
+{
+    double most = -INFINITY;
+    for (uint32_t k = 0; k < b->plane_count; ++k) {
+        const double *p = s->planes[b->first_plane + k];
+        most = fmax(most, p[0] * x[0] + p[1] * x[1] + p[2] * x[2] + p[3]);
+    }
+    return -most;
+}
+
+/* Where three planes of a body meet, drawn in by a little: false if that is not a corner of it. */
+static bool corner_of(dice *d, const umb_solids *s, const umb_solid *b, double out[3])
+{
+    double m[3][4];
+    for (int i = 0; i < 3; ++i) {
+        memcpy(m[i], s->planes[b->first_plane + dice_roll(d, b->plane_count)], sizeof m[i]);
+    }
+    double minors[3][3], det = 0.0;
+    for (int i = 0; i < 3; ++i) {
+        const double *p = m[(i + 1) % 3], *q = m[(i + 2) % 3];
+        for (int k = 0; k < 3; ++k) {
+            minors[i][k] = p[(k + 1) % 3] * q[(k + 2) % 3] - p[(k + 2) % 3] * q[(k + 1) % 3];
+        }
+    }
+    det = m[0][0] * minors[0][0] + m[0][1] * minors[0][1] + m[0][2] * minors[0][2];
+    for (int k = 0; k < 3; ++k) {
+        double x = -(m[0][3] * minors[0][k] + m[1][3] * minors[1][k] + m[2][3] * minors[2][k]) / det;
+        out[k] = x + 1e-6 * (b->inner[k] - x);
+    }
+    return fabs(det) > 1e-9 && depth_in(s, b, out) >= 0.0;
+}
+
+static uint32_t check_bodies(dice *d, const solid_case *c, const umb_solids *s)
+{
+    uint32_t inside = 0;
+    for (size_t i = 0; i < s->count; ++i) {
+        for (int n = 0; n < 60; ++n) {
+            double x[3];
+            if (n % 2 == 0) {
+                point_in(d, &c->occluder.bounds, x);
+            }
+            if (n % 2 == 0 ? depth_in(s, &s->items[i], x) >= 0.0 : corner_of(d, s, &s->items[i], x)) {
+                inside += 1;
+                assert_true(winding(c, x) > 0.5);
+            }
+        }
+    }
+    return inside;
+}
+
+/* What bodies hold is inside the solid that they come from. */
+static void test_inner_bodies(void **state)
+{
+    (void)state;
+    dice d = {73};
+    uint32_t inside = 0, bodies = 0;
+    for (uint32_t n = 0; n < times(600); ++n) {
+        static const int kinds[] = {L_SHAPE, U_SHAPE, DENTED, APART};
+        surface s;
+        solid_case c;
+        bool mirrored = n % 3 == 2;
+        umb_transform t = draw_transform(&d, mirrored);
+        make_surface(kinds[n % 4], &s);
+        for (uint32_t i = dice_roll(&d, 3); i > 0; --i) {
+            s.points[dice_roll(&d, s.point_count)][dice_roll(&d, 3)] += (float)dice_roll(&d, 5) - 2.0f;
+        }
+        open_case(&s, n % 3 == 0 ? NULL : &t, mirrored, &c);
+        umb_solids found = {.allocator = &c.allocator, .reach = 200.0};
+        double corners[8][3], min[3] = {150, 150, 150}, max[3] = {151, 152, 151};
+        umb_box_corners(min, max, corners);
+        if (umb_closed_solid(&c.occluder, (const float(*)[3])c.points)) {
+            assert_int_equal(umb_solids_add_inner(&found, &c.occluder, 0, (const double(*)[3])corners), UMB_OK);
+            bodies += (uint32_t)found.count;
+            inside += check_bodies(&d, &c, &found);
+        }
+        umb_solids_free(&found);
+        close_case(&c);
+    }
+    assert_true(bodies > 500 && inside > 5000);
+}
+
+/* ---- pieces that block ---------------------------------------------------------------------------------- */
+
+/* Where a segment meets a triangle from a side that blocks, if only just: 2 for nowhere. */
+static double front_at(const solid_case *c, uint32_t triangle, const double from[3], const double to[3])
+{
+    const uint32_t *t = c->mesh->triangles[triangle];
+    const float *p = c->points[t[0]], *q = c->points[t[c->occluder.mirrored ? 2 : 1]], *r = c->points[t[c->occluder.mirrored ? 1 : 2]];
+    double e[3], f[3], way[3], s[3], n[3], m[3];
+    for (int k = 0; k < 3; ++k) {
+        e[k] = (double)q[k] - p[k];
+        f[k] = (double)r[k] - p[k];
+        way[k] = to[k] - from[k];
+        s[k] = from[k] - p[k];
+    }
+    for (int k = 0; k < 3; ++k) {
+        n[k] = e[(k + 1) % 3] * f[(k + 2) % 3] - e[(k + 2) % 3] * f[(k + 1) % 3];
+        m[k] = s[(k + 1) % 3] * way[(k + 2) % 3] - s[(k + 2) % 3] * way[(k + 1) % 3];
+    }
+    double det = -(n[0] * way[0] + n[1] * way[1] + n[2] * way[2]);
+    double x = (f[0] * m[0] + f[1] * m[1] + f[2] * m[2]) / det, y = -(e[0] * m[0] + e[1] * m[1] + e[2] * m[2]) / det;
+    double at = (s[0] * n[0] + s[1] * n[1] + s[2] * n[2]) / det;
+    return (det > 0.0 || c->mesh->two_sided[triangle] != 0) && x > -1e-9 && y > -1e-9 && x + y < 1.0 + 1e-9 && at > -1e-9 && at < 1.0 + 1e-9 ? at : 2.0;
+}
+
+static bool is_stopped(const solid_case *c, const double from[3], const double to[3])
+{
+    for (uint32_t t = 0; t < c->mesh->triangle_count; ++t) {
+        if (front_at(c, t, from, to) < 2.0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+typedef struct pieces_check {
+    const solid_case *c;
+    dice *d;
+    double min[3], max[3]; /* the cell */
+    uint32_t convex, disks;
+} pieces_check;
+
+static uint32_t find_point(const umb_piece *piece, const float p[3])
+{
+    for (uint32_t i = 0; i < piece->count; ++i) {
+        if (piece->points[i][0] == p[0] && piece->points[i][1] == p[1] && piece->points[i][2] == p[2]) {
+            return i;
+        }
+    }
+    return UMB_NONE;
+}
+
+/* An edge of a disk's border, or inside it. */
+static bool has_edge(const umb_piece *piece, uint32_t a, uint32_t b)
+{
+    bool border = a < piece->ring && b < piece->ring && ((a + 1) % piece->ring == b || (b + 1) % piece->ring == a);
+    for (uint32_t i = 0; i < piece->edge_count && !border; ++i) {
+        const uint8_t *e = piece->edges[i];
+        border = (e[0] == a && e[1] == b) || (e[0] == b && e[1] == a);
+    }
+    return border;
+}
+
+/* Whatever leaves the cell through a triangle of a disk has met a front. */
+static void check_disk(pieces_check *x, const umb_piece *piece)
+{
+    for (uint32_t t = 0; t < x->c->mesh->triangle_count; ++t) {
+        uint32_t i[3];
+        for (int k = 0; k < 3; ++k) {
+            i[k] = find_point(piece, x->c->points[x->c->mesh->triangles[t][k]]);
+        }
+        if (i[0] == UMB_NONE || i[1] == UMB_NONE || i[2] == UMB_NONE || !has_edge(piece, i[0], i[1]) || !has_edge(piece, i[1], i[2]) ||
+            !has_edge(piece, i[2], i[0])) {
+            continue;
+        }
+        for (int n = 0; n < 10; ++n) {
+            double a = dice_between(x->d, 0.05, 0.9), b = dice_between(x->d, 0.05, 0.95 - a), from[3], to[3];
+            for (int k = 0; k < 3; ++k) {
+                from[k] = dice_between(x->d, x->min[k], x->max[k]);
+                to[k] = (1 - a - b) * piece->points[i[0]][k] + a * piece->points[i[1]][k] + b * piece->points[i[2]][k];
+                to[k] += 1e-6 * (to[k] - from[k]);
+            }
+            x->disks += 1;
+            assert_true(is_stopped(x->c, from, to));
+        }
+    }
+}
+
+/* Whatever gets into a convex piece has met a front. */
+static void check_convex(pieces_check *x, const umb_piece *piece)
+{
+    for (int n = 0; n < 40; ++n) {
+        double shares[UMB_UMBRA_VERTICES], sum = 0.0, from[3], to[3] = {0, 0, 0};
+        for (uint32_t i = 0; i < piece->count; ++i) {
+            shares[i] = dice_between(x->d, 0.01, 1);
+            sum += shares[i];
+        }
+        for (int k = 0; k < 3; ++k) {
+            from[k] = dice_between(x->d, x->min[k], x->max[k]);
+            for (uint32_t i = 0; i < piece->count; ++i) {
+                to[k] += shares[i] / sum * piece->points[i][k];
+            }
+        }
+        x->convex += 1;
+        assert_true(is_stopped(x->c, from, to));
+    }
+}
+
+static void check_piece(void *user, const umb_piece *piece)
+{
+    pieces_check *x = user;
+    if (piece->convex) {
+        check_convex(x, piece);
+    } else {
+        check_disk(x, piece);
+    }
+}
+
+/* Cells beside, across and inside: pieces block what leaves the cell through them. */
+static void test_pieces(void **state)
+{
+    (void)state;
+    dice d = {76};
+    uint32_t convex = 0, disks = 0;
+    for (uint32_t n = 0; n < times(1500); ++n) {
+        surface s;
+        solid_case c;
+        bool mirrored = dice_roll(&d, 2) == 0;
+        umb_transform t = draw_transform(&d, mirrored);
+        uint8_t known[1] = {0};
+        double corners[8][3];
+        make_surface((int)(n % CASES), &s);
+        open_case(&s, &t, mirrored, &c);
+        pieces_check x = {.c = &c, .d = &d};
+        point_in(&d, &c.occluder.bounds, x.min);
+        for (int k = 0; k < 3; ++k) {
+            x.min[k] += dice_roll(&d, 2) == 0 ? 0.0 : dice_between(&d, -40, 40);
+            x.max[k] = x.min[k] + dice_between(&d, 0, dice_roll(&d, 3) == 0 ? 8 : 1);
+        }
+        umb_box_corners(x.min, x.max, corners);
+        umb_pieces p = {.allocator = &c.allocator, .corners = (const double(*)[3])corners, .reach = 200.0, .emit = check_piece, .user = &x,
+                        .known = known};
+        assert_int_equal(umb_pieces_cut(&p, &c.occluder, 0), UMB_OK);
+        convex += x.convex;
+        disks += x.disks;
+        umb_pieces_free(&p);
+        close_case(&c);
+    }
+    assert_true(convex > 1000 && disks > 10000);
+}
+
+/* ---- segments that touch ----------------------------------------------------------------------------- */
+
+static void make_convex(dice *d, surface *s)
+{
+    static const int none[3] = {0, 0, 0};
+    memset(s, 0, sizeof *s);
+    if (dice_roll(d, 2) == 0) {
+        add_outline(s, &SQUARE, none, 5);
+        return;
+    }
+    for (int i = 0; i < 4; ++i) {
+        for (int k = 0; k < 3; ++k) {
+            s->points[i][k] = (float)dice_roll(d, 12) + (i == k ? 20.0f : 0.0f);
+        }
+    }
+    s->point_count = 4;
+    add_face(s, 0, 1, 2);
+    add_face(s, 3, 1, 0);
+    add_face(s, 3, 2, 1);
+    add_face(s, 3, 0, 2);
+}
+
+/* Two points exactly in the plane of a face. */
+static void points_on_plane(dice *d, const solid_case *c, double out[2][3])
+{
+    const uint32_t *t = c->mesh->triangles[dice_roll(d, c->mesh->triangle_count)];
+    for (int e = 0; e < 2; ++e) {
+        int x = (int)dice_roll(d, 7) - 3, y = (int)dice_roll(d, 7) - 3;
+        for (int k = 0; k < 3; ++k) {
+            double a = c->points[t[0]][k];
+            out[e][k] = a + x * (c->points[t[1]][k] - a) + y * (c->points[t[2]][k] - a);
+        }
+    }
+}
+
+/* A segment in the plane of a face, along an edge or through a corner only touches: it meets nothing. One through the middle
+ * does. */
+static void test_touching(void **state)
+{
+    (void)state;
+    dice d = {74};
+    uint32_t bodies = 0;
+    for (uint32_t n = 0; n < times(400); ++n) {
+        surface s;
+        solid_case c;
+        bool added;
+        double corners[8][3], min[3] = {-90, -90, -90}, max[3] = {-80, -81, -82};
+        make_convex(&d, &s);
+        open_case(&s, NULL, false, &c);
+        umb_solids found = {.allocator = &c.allocator, .reach = 128.0};
+        umb_box_corners(min, max, corners);
+        assert_int_equal(umb_solids_add(&found, &c.occluder, 0, (const double(*)[3])corners, &added), UMB_OK);
+        bodies += added ? 1 : 0;
+        for (int i = 0; i < 40 && added; ++i) {
+            double p[2][3], a[8][3], b[8][3];
+            points_on_plane(&d, &c, p);
+            for (int j = 0; j < 8; ++j) {
+                memcpy(a[j], p[0], sizeof a[j]);
+                memcpy(b[j], p[1], sizeof b[j]);
+            }
+            assert_false(umb_solid_meets(&found, &found.items[0], p[0], p[1]));
+            assert_true(umb_solid_blocks(&found, &found.items[0], (const double(*)[3])a, (const double(*)[3])b) == 0);
+            for (int k = 0; k < 3; ++k) {
+                p[1][k] = found.items[0].inner[k] + (found.items[0].inner[k] - corners[i % 8][k]);
+            }
+            assert_true(umb_solid_meets(&found, &found.items[0], corners[i % 8], p[1]));
+        }
+        umb_solids_free(&found);
+        close_case(&c);
+    }
+    assert_true(bodies > 50);
+}
+
+/* ---- beams ------------------------------------------------------------------------------------------ */
+
+typedef struct wall {
+    umb_solid items[5];
+    double planes[30][4];
+    umb_solids solids;
+} wall;
+
+/* Boxes along the axes. */
+static void add_box(wall *w, const double min[3], const double max[3])
+{
+    size_t at = w->solids.count++;
+    w->items[at] = (umb_solid){.first_plane = (uint32_t)(6 * at), .plane_count = 6};
+    for (int k = 0; k < 3; ++k) {
+        w->items[at].bounds.min[k] = nextafterf((float)min[k], -INFINITY);
+        w->items[at].bounds.max[k] = nextafterf((float)max[k], INFINITY);
+        w->items[at].inner[k] = 0.5 * (min[k] + max[k]);
+        double *low = w->planes[6 * at + 2 * (size_t)k], *high = low + 4;
+        low[k] = -1.0;
+        low[3] = min[k];
+        high[k] = 1.0;
+        high[3] = -max[k];
+    }
+}
+
+/* Four boxes around a hole at a point of the plane x = at[0], which may be filled. */
+static void make_wall(dice *d, const double at[3], double wide, double far, bool filled, wall *w)
+{
+    memset(w, 0, sizeof *w);
+    w->solids.items = w->items;
+    w->solids.planes = w->planes;
+    w->solids.reach = 100.0;
+    double left = wide * dice_between(d, 0.05, 0.95), low = wide * dice_between(d, 0.05, 0.95), thick = 0.02 * wide;
+    double y[2] = {at[1] - left, at[1] - left + wide}, z[2] = {at[2] - low, at[2] - low + wide}, x[2] = {at[0] - thick, at[0] + thick};
+    add_box(w, (double[3]){x[0], -far, -far}, (double[3]){x[1], y[0], far});
+    add_box(w, (double[3]){x[0], y[1], -far}, (double[3]){x[1], far, far});
+    add_box(w, (double[3]){x[0], -far, -far}, (double[3]){x[1], far, z[0]});
+    add_box(w, (double[3]){x[0], -far, z[1]}, (double[3]){x[1], far, far});
+    if (filled) {
+        add_box(w, (double[3]){x[0], y[0] - 2.0, z[0] - 2.0}, (double[3]){x[1], y[1] + 2.0, z[1] + 2.0});
+    }
+}
+
+static umb_beam_part draw_part(dice *d, double x)
+{
+    umb_beam_part p = {{x, dice_between(d, -2, 2), dice_between(d, -2, 2)}, {{0}}};
+    bool flat = dice_roll(d, 4) == 0, turned = dice_roll(d, 2) == 0;
+    for (int a = 0; a < 3; ++a) {
+        for (int k = 0; k < 3; ++k) {
+            p.axes[a][k] = a == k || turned ? dice_between(d, -1, 1) : 0.0;
+        }
+    }
+    for (int k = 0; k < 3 && flat; ++k) {
+        p.axes[dice_roll(d, 3)][k] = 0.0;
+    }
+    return p;
+}
+
+static void point_of_part(dice *d, const umb_beam_part *p, double out[3])
+{
+    bool corner = dice_roll(d, 3) == 0;
+    memcpy(out, p->middle, 3 * sizeof *out);
+    for (int a = 0; a < 3; ++a) {
+        double x = corner ? (dice_roll(d, 2) == 0 ? -1.0 : 1.0) : dice_between(d, -1, 1);
+        for (int k = 0; k < 3; ++k) {
+            out[k] += x * p->axes[a][k];
+        }
+    }
+}
+
+/* No beam is blocked through whose wall a segment goes. */
+static void test_beams(void **state)
+{
+    (void)state;
+    dice d = {75};
+    uint32_t all[5] = {0, 1, 2, 3, 4}, blocked = 0, tries = times(1500);
+    for (uint32_t n = 0; n < tries; ++n) {
+        umb_beam_part a = draw_part(&d, 0.0), b = draw_part(&d, dice_between(&d, 12, 40));
+        double from[3], to[3], at[3], part = dice_between(&d, 0.3, 0.7), wide = exp(dice_between(&d, log(1e-3), log(0.7)));
+        point_of_part(&d, &a, from);
+        point_of_part(&d, &b, to);
+        for (int k = 0; k < 3; ++k) {
+            at[k] = from[k] + part * (to[k] - from[k]);
+        }
+        wall w;
+        dice same = d;
+        make_wall(&d, at, wide, 60.0, false, &w);
+        umb_beam_search s = {&w.solids, 3000};
+        bool thin = fabs(to[1] - from[1]) + fabs(to[2] - from[2]) < to[0] - from[0]; /* then it is through before it meets a side */
+        assert_false(thin && umb_beam_blocked(&s, &a, &b, all, 4));
+        make_wall(&same, at, wide, 60.0, true, &w);
+        s = (umb_beam_search){&w.solids, 3000};
+        blocked += umb_beam_blocked(&s, &a, &b, all, 5) ? 1 : 0;
+    }
+    printf("%u of %u blocked without a hole\n", blocked, tries);
+    assert_true(blocked > tries / 4);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_known_surfaces), cmocka_unit_test(test_moved_surfaces), cmocka_unit_test(test_inner_bodies),
+        cmocka_unit_test(test_touching),       cmocka_unit_test(test_pieces),          cmocka_unit_test(test_beams),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
