@@ -6,7 +6,7 @@
  * Prints the tables of docs/results/soak.md: views, then view cells. What is done is kept in FOLDER (out/soak), a file for
  * each part of the plan, and taken up by the next run of the same program over the same scenes.
  * --only: parts whose name or family contains TEXT. --without: but not those whose name contains it. --views: of each part
- * no more than N new ones. --rays: of each view cell.
+ * no more than N new ones. --rays: of each view cell but those of micro scenes.
  * --plant: cull a scene with a planted mistake (1: objects too small, 2: occluders too large),
  * which must be found. --part --view: one view alone, told in full. FOLDER/wrongly-hidden.txt and
  * unconfirmed.txt name objects with their lines.
@@ -155,6 +155,18 @@ static void print_cell_row(const char *name, const soak_count *c)
            (double)c->reported / seen, c->open, c->wrong, c->unconfirmed, c->seconds);
 }
 
+/* Over all cells. */
+static void print_kinds(const soak_count *all)
+{
+    puts("\n| kind of cell | cells | rays | pairs of a cell and a hidden object | wrongly hidden |");
+    puts("|---|---|---|---|---|");
+    for (uint32_t k = 0; k < SOAK_KINDS; ++k) {
+        const soak_kind *kind = &all->kinds[k];
+        printf("| %s | %" PRIu64 " | %" PRIu64 " | %" PRIu64 " | %" PRIu64 " |\n", soak_cell_kind(k), kind->cells, kind->rays,
+               kind->hidden, kind->wrong);
+    }
+}
+
 static void print_cells(const soak_plan *plan, const soak_count *counts)
 {
     soak_count all = {0};
@@ -169,6 +181,7 @@ static void print_cells(const soak_plan *plan, const soak_count *counts)
         }
     }
     print_cell_row("**all cells**", &all);
+    print_kinds(&all);
 }
 
 static void print_table(const soak_plan *plan, const soak_count *counts)
@@ -309,7 +322,7 @@ int main(int count, char **words)
         return INPUT;
     }
     for (uint32_t k = 0; s.rays != 0 && k < plan.count; ++k) {
-        plan.parts[k].rays = of_cells(&plan.parts[k]) ? s.rays : plan.parts[k].rays;
+        plan.parts[k].rays = plan.parts[k].style == SOAK_CELLS ? s.rays : plan.parts[k].rays;
     }
     int code = run_plan(&s, &plan, words[0]);
     soak_plan_free(&plan);

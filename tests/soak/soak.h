@@ -51,7 +51,7 @@ typedef struct soak_scene {
     plant planted;
     model *model;
     umb_scene *built;
-    umb_index *index, *flat; /* flat: small scenes only */
+    umb_index *index, *flat, *kd; /* the last two: small scenes only */
     truth *oracle;
     camera_path path; /* its own, in the model's coordinates; count 0: none */
 } soak_scene;
@@ -69,9 +69,15 @@ bool soak_view_adversarial(const model *m, uint64_t number, umb_view *out);
 /* What kind of view that is, for people. */
 const char *soak_view_kind(uint64_t number);
 
-/* View cell number `number`, the method's settings with it. */
+/* View cell number `number`, the method's settings with it. Its kind is the number modulo SOAK_KINDS. */
+#define SOAK_KINDS 9u
 bool soak_cell(const model *m, const camera_path *path, uint64_t number, umb_region_query *out);
 const char *soak_cell_kind(uint64_t number);
+
+/* Of cells of one kind. */
+typedef struct soak_kind {
+    uint64_t cells, rays, hidden, wrong; /* hidden: pairs of a cell and an object that its set lacks */
+} soak_kind;
 
 /* What was counted, over views. seen: objects in view with an exactly confirmed sight-line. */
 typedef struct soak_count {
@@ -79,6 +85,7 @@ typedef struct soak_count {
     uint64_t proven, open; /* hidden objects looked at exactly: proven hidden, not decided. Of cells:
                               objects in the sets before refinement, undecided ones after it */
     double seconds;        /* of one thread each */
+    soak_kind kinds[SOAK_KINDS];
 } soak_count;
 
 void soak_count_add(soak_count *sum, const soak_count *c);

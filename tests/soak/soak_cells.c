@@ -1,7 +1,7 @@
 /* View cells of the long run: each is answered by the region engine and held against rays from it.
  *
  * A cell comes from the scene and a number alone, by turns: where one would walk, in what is solid, across
- * surfaces, flat ones and points, large ones, at the border of the scene and beyond, with faces in the
+ * surfaces, flat ones and lines, points, large ones, at the border of the scene and beyond, with faces in the
  * planes that indices split at, with corners on vertices. */
 #include <inttypes.h>
 #include <math.h>
@@ -16,16 +16,17 @@
 
 #define CORNER_COSINE 0.2588190451025207 /* of 75 degrees: umb_region_query.near_depth */
 
-/* Large sets are refined with little effort, the largest in one cell of eight only: else nearly all of the time would go there. */
-enum { SMALL_SET = 5000, LARGE_SET = 20000, QUICK_EFFORT = 32 };
+/* Small sets are refined with the library's effort; of others some cells with little: else nearly all of the time would go
+ * there. */
+enum { SMALL_SET = 2000, LARGE_SET = 20000, QUICK_EFFORT = 32 };
 
-enum { WALKED, INSIDE, ACROSS, FLAT, LARGE, BORDER, PLANES, VERTEX, KINDS };
-static const char *const kind_names[KINDS] = {"walked", "inside", "across",    "flat",
-                                              "large",  "border", "on planes", "at a vertex"};
+enum { WALKED, INSIDE, ACROSS, FLAT, LARGE, BORDER, PLANES, VERTEX, POINT };
+static const char *const kind_names[SOAK_KINDS] = {"walked", "inside",    "across",      "flat", "large",
+                                                   "border", "on planes", "at a vertex", "a point"};
 
 const char *soak_cell_kind(uint64_t number)
 {
-    return kind_names[number % KINDS];
+    return kind_names[number % SOAK_KINDS];
 }
 
 /* Something of the scene to make a cell from. */
@@ -82,7 +83,7 @@ static void shape_cell(const model *m, const place *p, uint64_t number, soak_dic
                        double at[3], double half[3])
 {
     double share = magnitude(dice, 1e-3, 1.0);
-    switch (number % KINDS) {
+    switch (number % SOAK_KINDS) {
     case INSIDE:
         for (int i = 0; i < 3; ++i) {
             at[i] = 0.5 * ((double)p->box.min[i] + p->box.max[i]);
@@ -96,8 +97,10 @@ static void shape_cell(const model *m, const place *p, uint64_t number, soak_dic
         break;
     case FLAT:
         half[soak_below(dice, 3)] = 0.0;
-        half[soak_below(dice, 3)] = 0.0;
         half[soak_below(dice, 3)] *= soak_below(dice, 2);
+        break;
+    case POINT:
+        half[0] = half[1] = half[2] = 0.0;
         break;
     case LARGE:
         for (int i = 0; i < 3; ++i) {
@@ -179,7 +182,7 @@ bool soak_cell(const model *m, const camera_path *path, uint64_t number, umb_reg
     }
     shape_cell(m, &p, number, &dice, at, half);
     around(at, half, out);
-    if (number % KINDS == PLANES) {
+    if (number % SOAK_KINDS == PLANES) {
         snap_to_planes(&p, &dice, out);
     }
     choose_settings(m, &dice, out);
@@ -230,8 +233,9 @@ static void count_objects(const soak_judge *j, const region_result *r, const uin
 {
     const model *m = j->model;
     for (uint32_t i = 0; i < m->object_count; ++i) {
-        sum->pairs += m->objects[i].mesh != MODEL_NONE &&
-                      m->meshes[m->objects[i].mesh].triangle_count;
+        bool counts = m->objects[i].mesh != MODEL_NONE && m->meshes[m->objects[i].mesh].triangle_count != 0;
+        sum->pairs += counts;
+        sum->kinds[number % SOAK_KINDS].hidden += counts && accused[i];
         if (accused[i] && r->witness_of[i] != MODEL_NONE) {
             const region_witness *w = &r->witnesses[r->witness_of[i]];
             tell(j, w->confirmed ? "wrongly-hidden" : "unconfirmed", number, w);
@@ -241,6 +245,10 @@ static void count_objects(const soak_judge *j, const region_result *r, const uin
     sum->unconfirmed += r->unconfirmed;
     sum->seen += r->seen_objects;
     sum->rays += r->rays;
+    soak_kind *kind = &sum->kinds[number % SOAK_KINDS];
+    kind->cells += 1;
+    kind->rays += r->rays;
+    kind->wrong += r->wrong;
 }
 
 static bool judge(const soak_judge *j, const umb_region_query *q, const umb_region_answer *a,
@@ -286,6 +294,12 @@ static bool judge(const soak_judge *j, const umb_region_query *q, const umb_regi
     return ok;
 }
 
+/* Kinds take turns of nine: a fourth and a sixteenth of the cells are of all kinds. */
+static bool is_refined(uint32_t pvs_count, uint64_t number)
+{
+    return pvs_count <= SMALL_SET || number % (pvs_count <= LARGE_SET ? 4 : 16) == 0;
+}
+
 bool soak_judge_cell(const soak_judge *j, umb_region *region, const camera_path *path,
                      uint64_t number, soak_count *sum, umb_error *error)
 {
@@ -296,7 +310,7 @@ bool soak_judge_cell(const soak_judge *j, umb_region *region, const camera_path 
         return false;
     }
     umb_result result = umb_region_solve(region, &q, &a);
-    if (result == UMB_OK && (a.pvs_count <= LARGE_SET || number % 16 < 2)) {
+    if (result == UMB_OK && is_refined(a.pvs_count, number)) {
         result = umb_region_refine(region, a.pvs_count <= SMALL_SET ? 0 : QUICK_EFFORT, &a);
     } else {
         a.refined = a.pvs;

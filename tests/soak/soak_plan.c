@@ -19,19 +19,20 @@ typedef struct scene_row {
 static const scene_row ROWS[] = {
     {"blocks", "blocks-316", "gen:blocks,g=316", 0.0, true, 3200, 0, 0, 0, 0, 0},
     {"blocks", "blocks-100", "gen:blocks,g=100", 0.0, true, 800, 300, 0, 0, 0, 0},
-    {"blocks", "blocks-32", "gen:blocks,g=32", 0.0, true, 800, 500, 24, 0, 16, 0},
+    {"blocks", "blocks-32", "gen:blocks,g=32", 0.0, true, 800, 500, 24, 0, 18, 0},
     {"blocks", "blocks-32-moved", "gen:blocks,g=32", 50.0, true, 160, 300, 0, 0, 0, 0},
-    {"boxfield", "boxfield-20M", "gen:boxfield,polygons=20M", 0.0, true, 1600, 0, 0, 0, 4, 0},
-    {"boxfield", "boxfield-200k", "gen:boxfield,polygons=200k", 0.0, true, 800, 500, 0, 0, 48, 0},
-    {"boxfield", "boxfield-200k-moved", "gen:boxfield,polygons=200k", 50.0, true, 160, 300, 0, 0, 16, 0},
-    {"city", "city-20M", "gen:city,triangles=20M", 0.0, true, 1600, 0, 0, 0, 4, 0},
-    {"city", "city-1M", "gen:city,triangles=1M", 0.0, true, 800, 600, 0, 0, 48, 0},
-    {"city", "city-200k-moved", "gen:city,triangles=200k", 50.0, true, 160, 300, 0, 0, 16, 0},
-    {"building", "building-40", "gen:building,floors=40", 0.0, true, 800, 500, 0, 0, 32, 0},
-    {"building", "building-1-moved", "gen:building,floors=1", 50.0, true, 160, 300, 0, 16, 16, 16},
+    {"boxfield", "boxfield-20M", "gen:boxfield,polygons=20M", 0.0, true, 1600, 0, 0, 0, 0, 0},
+    {"boxfield", "boxfield-200k", "gen:boxfield,polygons=200k", 0.0, true, 800, 500, 0, 0, 36, 0},
+    {"boxfield", "boxfield-200k-moved", "gen:boxfield,polygons=200k", 50.0, true, 160, 300, 0, 0, 18, 0},
+    {"city", "city-20M", "gen:city,triangles=20M", 0.0, true, 1600, 0, 0, 0, 0, 0},
+    {"city", "city-1M", "gen:city,triangles=1M", 0.0, true, 800, 600, 0, 0, 18, 0},
+    {"city", "city-200k", "gen:city,triangles=200k", 0.0, true, 0, 0, 0, 0, 36, 0},
+    {"city", "city-200k-moved", "gen:city,triangles=200k", 50.0, true, 160, 300, 0, 0, 18, 0},
+    {"building", "building-40", "gen:building,floors=40", 0.0, true, 800, 500, 0, 0, 36, 0},
+    {"building", "building-1-moved", "gen:building,floors=1", 50.0, true, 160, 300, 0, 16, 18, 18},
     {"medley", "medley-1M", "medley:1000000", 0.0, true, 1200, 0, 0, 0, 0, 0},
-    {"medley", "medley-20k", "medley:20000", 0.0, false, 800, 600, 0, 0, 16, 0},
-    {"medley", "medley-2k", "medley:2000", 0.0, true, 400, 500, 16, 16, 16, 16},
+    {"medley", "medley-20k", "medley:20000", 0.0, false, 800, 600, 0, 0, 18, 0},
+    {"medley", "medley-2k", "medley:2000", 0.0, true, 400, 500, 16, 16, 18, 18},
     {"medley", "medley-2k-moved", "medley:2000", 5000.0, true, 160, 300, 0, 0, 0, 0},
 };
 enum { ROW_COUNT = sizeof ROWS / sizeof ROWS[0] };
@@ -40,13 +41,14 @@ enum { ROW_COUNT = sizeof ROWS / sizeof ROWS[0] };
 enum {
     REAL_ORDINARY = 160,
     REAL_ADVERSARIAL = 320,
-    REAL_CELLS = 8,
+    REAL_CELLS = 9,
     MICRO_VIEWS = 6000,
+    MICRO_CELLS = 2000,
     SHORT_MICRO = 48
 };
 
 /* Rays of a cell, and of one of a micro scene. */
-enum { CELL_RAYS = 4000000, SHORT_CELL_RAYS = 30000, MICRO_CELL_RAYS = 20000 };
+enum { CELL_RAYS = 3300000, SHORT_CELL_RAYS = 30000, MICRO_CELL_RAYS = 20000 };
 
 static uint32_t rays_of(soak_style style, bool full)
 {
@@ -133,7 +135,7 @@ bool soak_plan_make(bool full, double scale, soak_plan *out, umb_error *error)
     ok = ok && (!full || add_real(out, scale, error));
     scene_row micro = {.family = "micro scenes", .name = "micro", .scene = "micro"};
     ok = ok && add(out, &micro, SOAK_MICRO, full, scale * (full ? MICRO_VIEWS : SHORT_MICRO));
-    ok = ok && add(out, &micro, SOAK_MICRO_CELLS, full, scale * (full ? MICRO_VIEWS : SHORT_MICRO));
+    ok = ok && add(out, &micro, SOAK_MICRO_CELLS, full, scale * (full ? MICRO_CELLS : SHORT_MICRO));
     if (!ok) {
         soak_plan_free(out);
         if (error->text[0] == '\0') {
@@ -213,7 +215,7 @@ static bool load_path(soak_scene *s, umb_error *error)
 bool soak_scene_load(const soak_part *part, plant planted, soak_scene *out, umb_error *error)
 {
     umb_tasks tasks = {0};
-    umb_index_def flat = {.kind = UMB_INDEX_FLAT};
+    umb_index_def flat = {.kind = UMB_INDEX_FLAT}, kd = {.kind = UMB_INDEX_KDTREE};
     memset(out, 0, sizeof *out);
     memcpy(out->scene, part->scene, sizeof out->scene);
     out->shift = part->shift;
@@ -237,6 +239,7 @@ bool soak_scene_load(const soak_part *part, plant planted, soak_scene *out, umb_
     ok = ok && out->built != NULL && umb_index_create(out->built, NULL, &out->index) == UMB_OK;
     if (ok && out->model->object_count < 50000) {
         ok = umb_index_create(out->built, &flat, &out->flat) == UMB_OK;
+        ok = ok && umb_index_create(out->built, &kd, &out->kd) == UMB_OK;
     }
     out->oracle = ok ? truth_create(out->model, error) : NULL;
     if (out->oracle == NULL) {
@@ -251,6 +254,7 @@ void soak_scene_free(soak_scene *s)
     camera_path_free(&s->path);
     umb_index_destroy(s->index);
     umb_index_destroy(s->flat);
+    umb_index_destroy(s->kd);
     umb_scene_destroy(s->built);
     if (s->oracle != NULL) {
         truth_destroy(s->oracle);

@@ -241,20 +241,25 @@ static bool micro_view(bench *b, uint64_t number, soak_count *sum)
     return ok;
 }
 
+/* One engine answers most cells, one after the other; every fifth cell has a flat index, every fifth a kd-tree, and a quarter
+ * other instruction sets. */
 static bool cell_batch(bench *b, uint64_t first, uint64_t last, soak_count *sum)
 {
     const soak_scene *s = b->crew->run->scene;
-    uint64_t batch = first / SOAK_BATCH;
     umb_error error = {0};
-    umb_region *region = NULL;
-    umb_region_def def = {.isa = isa_of(batch), .error = &error};
-    umb_index *index = s->flat != NULL && batch % 5 == 4 ? s->flat : s->index;
+    umb_region *common = NULL, *own = NULL;
     soak_judge judge = {b->crew->run->part, s->model, s->oracle, b->crew->run->folder, b->print};
-    bool ok = umb_region_create(index, &def, &region) == UMB_OK;
+    bool ok = umb_region_create(s->index, &(umb_region_def){.error = &error}, &common) == UMB_OK;
     for (uint64_t k = first; ok && k < last; ++k) {
-        ok = soak_judge_cell(&judge, region, &s->path, k, sum, &error);
+        umb_index *index = s->flat != NULL && k % 5 == 4 ? s->flat : s->kd != NULL && k % 5 == 3 ? s->kd : s->index;
+        umb_region_def def = {.isa = isa_of(k), .error = &error};
+        bool usual = index == s->index && def.isa == UMB_ISA_AUTO;
+        ok = (usual || umb_region_create(index, &def, &own) == UMB_OK) &&
+             soak_judge_cell(&judge, usual ? common : own, &s->path, k, sum, &error);
+        umb_region_destroy(own);
+        own = NULL;
     }
-    umb_region_destroy(region);
+    umb_region_destroy(common);
     return ok || fail(b->crew, "a cell", &error);
 }
 
