@@ -216,8 +216,8 @@ static void place_stray(umb_tree_edit *e, uint32_t ref, const umb_aabb *box)
 }
 
 /* Where few move, they go far from those that they were put beside before there are changes enough for a new tree, and make boxes
- * as long as their ways. Each is put elsewhere once its node has grown: one such commit in twenty or so, for each of them. What moves by itself is
- * left out: beside large volumes it opened more nodes than it saved. */
+ * as long as their ways. Each is put elsewhere once its node has grown: one such commit in twenty or so, for each of them. What
+ * moves by itself is left out: beside large volumes that opened more nodes than it saved. */
 static void place_strays(umb_tree_edit *e, const umb_committed *scene)
 {
     for (uint32_t i = (uint32_t)(scene->version % TURNS); i < scene->moved_count && !e->failed; i += TURNS) {
