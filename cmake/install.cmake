@@ -17,10 +17,15 @@ write_basic_package_version_file(${CMAKE_BINARY_DIR}/umbrage-config-version.cmak
 install(FILES ${CMAKE_BINARY_DIR}/umbrage-config.cmake ${CMAKE_BINARY_DIR}/umbrage-config-version.cmake
         DESTINATION ${UMB_PACKAGE_DIR})
 
+# They name the folder that is installed to, which is known only then (cmake --install --prefix).
 foreach(library umbrage umbrage-bake)
-  configure_file(cmake/${library}.pc.in ${CMAKE_BINARY_DIR}/${library}.pc @ONLY)
+  install(CODE "
+    set(CMAKE_INSTALL_LIBDIR \"${CMAKE_INSTALL_LIBDIR}\")
+    set(CMAKE_INSTALL_INCLUDEDIR \"${CMAKE_INSTALL_INCLUDEDIR}\")
+    set(PROJECT_VERSION \"${PROJECT_VERSION}\")
+    configure_file(\"${CMAKE_CURRENT_SOURCE_DIR}/cmake/${library}.pc.in\" \"${CMAKE_BINARY_DIR}/${library}.pc\" @ONLY)")
+  install(FILES ${CMAKE_BINARY_DIR}/${library}.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 endforeach()
-install(FILES ${CMAKE_BINARY_DIR}/umbrage.pc ${CMAKE_BINARY_DIR}/umbrage-bake.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 
 if(TARGET umbrage-program)
   install(TARGETS umbrage-program RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})

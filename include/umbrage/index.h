@@ -80,9 +80,9 @@ typedef enum umb_index_update {
     /* Inserted at the deepest node that holds it, from the top; full nodes are split by planes through the weighted
        mean of what they hold (Shagam and Pfeiffer 2003) */
     UMB_UPDATE_DEEPEST = 5,
-    /* Refitted; and when boxes have grown by a seventh the tree is built anew beside the one in use, by a
-       twenty-fourth each commit, and takes its place. Other kinds than BVH: built anew at once when boxes have doubled,
-       which allocates */
+    /* Refitted; and when boxes have grown by a seventh the tree is built anew beside the one in use, half a millisecond
+       or so each commit, and takes its place. Where few move, at most one in sixteen, what has made its node twice as large
+       is put elsewhere instead. Other kinds than BVH: built anew at once when boxes have doubled, which allocates */
     UMB_UPDATE_INCREMENTAL = 6,
     /* GRID only, which is then one of overlapping voxels, scaled to unit cubes: an object belongs to the voxel of its box's
        minimum corner alone, and one that moves within it changes nothing else (Tai and Hsu 3.1) */

@@ -567,12 +567,14 @@ static umb_result make_empty(umb_scene *scene, const umb_index_def *def, umb_ind
 {
     *out = NULL;
     if (!umb_index_name_known(def)) {
-        return umb_scene_fail(scene, UMB_ERROR_ARGUMENT, "no index of kind %d with rule %d", (int)def->kind,
-                              (int)def->rule);
+        return umb_scene_fail(scene, UMB_ERROR_ARGUMENT,
+                              "no index of kind %s has rule %d with options %u; umb_index_parse() makes those that there are",
+                              umb_index_kind_name(def->kind), (int)def->rule, def->options);
     }
     if (!umb_index_can_update(def)) {
-        return umb_scene_fail(scene, UMB_ERROR_ARGUMENT, "an index of this kind has no way %d to follow its scene",
-                              (int)def->update);
+        const char *way = umb_index_update_name(def->update);
+        return umb_scene_fail(scene, UMB_ERROR_ARGUMENT, "an index %s has no way %d (%s) to follow its scene", umb_index_name(def),
+                              (int)def->update, way != NULL ? way : "unknown");
     }
     const umb_allocator *a = umb_scene_allocator(scene);
     umb_index *index = umb_memory_allocate_zero(a, 1, sizeof(*index));

@@ -21,8 +21,7 @@ static bool is_promise(const umb_motion_def *d)
 {
     const double numbers[6] = {d->max_speed,    d->max_acceleration, d->max_spin,
                                d->first_period, d->least_period,     d->most_period};
-    bool good = umb_box_is_possible(&d->volume) &&
-                (d->kind == UMB_MOTION_SPEED || (d->kind == UMB_MOTION_VOLUME && !umb_box_is_zero(&d->volume)));
+    bool good = umb_box_is_possible(&d->volume) && (d->kind == UMB_MOTION_SPEED || d->kind == UMB_MOTION_VOLUME);
     for (int i = 0; i < 6; ++i) {
         good = good && numbers[i] >= 0.0;
     }
@@ -130,7 +129,10 @@ umb_result umb_scene_set_motion(umb_scene *scene, uint32_t object, const umb_mot
         return umb_scene_fail(scene, UMB_ERROR_STATE, "set where poses come from before the first motion");
     }
     if (!is_promise(def)) {
-        return umb_scene_fail(scene, UMB_ERROR_ARGUMENT, "a motion's numbers are negative, or its volume is no box");
+        return umb_scene_fail(scene, UMB_ERROR_ARGUMENT, "a motion's numbers are negative or none, or its volume is no box");
+    }
+    if (def->kind == UMB_MOTION_VOLUME && umb_box_is_zero(&def->volume)) {
+        return umb_scene_fail(scene, UMB_ERROR_ARGUMENT, "a motion within a volume (UMB_MOTION_VOLUME) has none: set its volume");
     }
     umb_result result = start(scene, object, def);
     if (result == UMB_OK) {
