@@ -22,14 +22,15 @@ static const scene_row ROWS[] = {
     {"blocks", "blocks-32", "gen:blocks,g=32", 0.0, true, 800, 500, 24, 0, 18, 0},
     {"blocks", "blocks-32-moved", "gen:blocks,g=32", 50.0, true, 160, 300, 0, 0, 0, 0},
     {"boxfield", "boxfield-20M", "gen:boxfield,polygons=20M", 0.0, true, 1600, 0, 0, 0, 0, 0},
-    {"boxfield", "boxfield-200k", "gen:boxfield,polygons=200k", 0.0, true, 800, 500, 0, 0, 18, 0},
+    {"boxfield", "boxfield-200k", "gen:boxfield,polygons=200k", 0.0, true, 800, 500, 0, 0, 9, 0},
     {"boxfield", "boxfield-200k-moved", "gen:boxfield,polygons=200k", 50.0, true, 160, 300, 0, 0, 9, 0},
     {"boxfield", "boxfield-50k", "gen:boxfield,polygons=50k", 0.0, true, 0, 0, 0, 0, 36, 0},
     {"city", "city-20M", "gen:city,triangles=20M", 0.0, true, 1600, 0, 0, 0, 0, 0},
     {"city", "city-1M", "gen:city,triangles=1M", 0.0, true, 800, 600, 0, 0, 18, 0},
     {"city", "city-200k", "gen:city,triangles=200k", 0.0, true, 0, 0, 0, 0, 36, 0},
     {"city", "city-200k-moved", "gen:city,triangles=200k", 50.0, true, 160, 300, 0, 0, 18, 0},
-    {"building", "building-40", "gen:building,floors=40", 0.0, true, 800, 500, 0, 0, 36, 0},
+    {"building", "building-40", "gen:building,floors=40", 0.0, true, 800, 500, 0, 0, 9, 0},
+    {"building", "building-8", "gen:building,floors=8", 0.0, true, 0, 0, 0, 0, 18, 0},
     {"building", "building-1-moved", "gen:building,floors=1", 50.0, true, 160, 300, 0, 16, 18, 18},
     {"medley", "medley-1M", "medley:1000000", 0.0, true, 1200, 0, 0, 0, 0, 0},
     {"medley", "medley-20k", "medley:20000", 0.0, false, 800, 600, 0, 0, 18, 0},
@@ -44,12 +45,12 @@ enum {
     REAL_ADVERSARIAL = 320,
     REAL_CELLS = 9,
     MICRO_VIEWS = 6000,
-    MICRO_CELLS = 2000,
+    MICRO_CELLS = 1000,
     SHORT_MICRO = 48
 };
 
 /* Rays of a cell, and of one of a micro scene. */
-enum { CELL_RAYS = 3300000, SHORT_CELL_RAYS = 30000, MICRO_CELL_RAYS = 20000 };
+enum { CELL_RAYS = 4500000, SHORT_CELL_RAYS = 30000, MICRO_CELL_RAYS = 20000 };
 
 static uint32_t rays_of(soak_style style, bool full)
 {
