@@ -4,6 +4,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "ray_tilt.h"
+
 /* Relative slack of sums of doubles in this file: each is a handful of products of numbers of which the largest is
  * named, so 2^-44 of that is hundreds of times what rounding can do. */
 #define SLACK 0x1p-44
@@ -48,12 +50,25 @@ bool umb_ray_shape_measure(const umb_ray_frame *f, const umb_ray_point *points, 
     return out->u_max >= -f->hu - f->error;
 }
 
+/* Every corner is as high or as low as the body gets: a wall, a house. */
+static bool is_upright(const umb_ray_point *points, uint32_t count, const umb_ray_shape *shape)
+{
+    double low = INFINITY, high = -INFINITY, more = 0x1p-10 * (shape->z1 - shape->z0);
+    for (uint32_t i = 0; i < count; ++i) {
+        low = points[i].z > shape->z0 + more ? umb_least(low, points[i].z) : low;
+        high = points[i].z < shape->z1 - more ? umb_most(high, points[i].z) : high;
+    }
+    return low > shape->z1 - more && high < shape->z0 + more;
+}
+
 bool umb_ray_shape_outline(const umb_ray_frame *f, const umb_ray_point *points, uint32_t count, bool in_order,
                            umb_ray_shape *out)
 {
     umb_ray_point sorted[UMB_RAY_OUTLINE];
     const umb_ray_point *corners = points;
     uint32_t n = count;
+    out->points = points;
+    out->point_count = in_order || is_upright(points, count, out) ? 0 : count;
     if (!in_order) {
         uint8_t order[UMB_RAY_OUTLINE];
         n = umb_ray_hull(points, count, order);
@@ -168,6 +183,7 @@ static bool bounds_of(const umb_ray_frame *f, const umb_ray_shape *shape, double
     q->top = q->top < f->steep ? q->top : f->steep; /* no ray is steeper */
     q->bottom = q->bottom > -f->steep ? q->bottom : -f->steep;
     q->depth = nextafterf((float)u_min, -INFINITY);
+    q->tilted = false;
     return true;
 }
 
@@ -306,7 +322,15 @@ static bool tile_hides(const asked *a, uint32_t i, uint32_t j)
     if (touched == 0) {
         return true;
     }
-    return bounded && a->kernels->open(&m->intervals[(size_t)tile * m->umbrae], m->umbrae, &q) == 0;
+    if (!bounded) {
+        return false;
+    }
+    const umb_umbra_tile *intervals = &m->intervals[(size_t)tile * m->umbrae];
+    if (a->kernels->open(intervals, m->umbrae, &q) == 0) {
+        return true;
+    }
+    umb_ray_tilt tilt = {m, a->shape, b.s[0], b.t[0], u_min, u_max, span[0], span[1]};
+    return umb_ray_tilt_bound(&tilt, a->kernels, &q) && a->kernels->open(intervals, m->umbrae, &q) == 0;
 }
 
 static bool group_holds(const asked *a, uint32_t gi, uint32_t gj, bool *touched)

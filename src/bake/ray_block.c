@@ -96,6 +96,29 @@ static bool may_cross(const umb_umbra *o, umb_umbra_edge e, uint32_t columns)
     return (sides(&o->vertices[e.a], columns) | sides(&o->vertices[e.b], columns)) == 3u;
 }
 
+/* Lines of a tile of the run may have the vertex below them (side 1) or above (2). */
+static bool has_side(const umb_umbra_vertex *v, uint32_t tile, uint32_t side)
+{
+    umb_umbra_vertex there = *v;
+    there.f -= (float)(tile * UMB_TILE) * v->dt;
+    return (sides(&there, UMB_TILE) & side) != 0;
+}
+
+/* False if surely no pixel of a tile of the run is covered: both chains have to be crossed there. */
+static bool may_cover(const band *d, bool floor, uint32_t tile)
+{
+    const umb_umbra *o = &d->umbra;
+    if (o->top_count == 0 || (o->bottom_count == 0 && (!floor || d->blocker->convex))) {
+        return false;
+    }
+    for (int i = 0; i < 2; ++i) {
+        if (!has_side(&o->vertices[o->low[i]], tile, 1) || !has_side(&o->vertices[o->high[i]], tile, 2)) {
+            return false;
+        }
+    }
+    return true;
+}
+
 /* A chain's edges that may be crossed in the run, and the inner vertices that may be straddled. reference: the height
  * that its far bound is measured from; over it the near quotient is the larger one, under it the farther. */
 static uint32_t use_chain(band *d, const uint8_t *chain, uint32_t count, uint32_t column, uint32_t columns,
@@ -227,23 +250,27 @@ static void draw_run(band *d, uint32_t group, uint32_t from, uint32_t to)
     if (first == UMB_NONE) {
         return;
     }
-    umb_umbra_draw draw = {.umbra = &d->umbra, .umbrae = m->umbrae, .half = d->half, .steep = m->frame->steep, .tile_count = last - first + 1};
+    umb_umbra_draw draw = {.umbra = &d->umbra, .umbrae = m->umbrae, .half = d->half, .steep = m->frame->steep};
+    make_umbra(d, first * UMB_TILE, (last - first + 1) * UMB_TILE, floor, span);
     for (uint32_t j = first; j <= last; ++j) {
         uint32_t tile = d->row * m->columns + j;
-        if (!wanted[j - group * UMB_TILE]) {
+        if (!wanted[j - group * UMB_TILE] || !may_cover(d, floor, j - first)) {
             continue;
         }
+        draw.tile_count = j - first + 1;
         draw.tiles[j - first] = &m->intervals[(size_t)tile * m->umbrae];
         if (!m->drawn[tile]) {
             umb_umbra_clear(draw.tiles[j - first], m->umbrae, m->live[tile]);
             m->drawn[tile] = true;
         }
     }
-    make_umbra(d, first * UMB_TILE, draw.tile_count * UMB_TILE, floor, span);
+    if (draw.tile_count == 0) {
+        return;
+    }
     d->kernels->draw(&draw);
-    for (uint32_t j = first; j <= last; ++j) {
-        if (draw.tiles[j - first] != NULL) {
-            m->summaries[d->row * m->columns + j] = draw.summaries[j - first];
+    for (uint32_t j = 0; j < draw.tile_count; ++j) {
+        if (draw.tiles[j] != NULL) {
+            m->summaries[d->row * m->columns + first + j] = draw.summaries[j];
         }
     }
     m->stale[(d->row / m->group_rows) * groups + group] = true;

@@ -82,6 +82,8 @@ typedef struct umb_ray_shape {
     uint32_t count;
     double z0, z1; /* lowest and highest */
     double u_min, u_max, v_min, v_max;
+    const umb_ray_point *points; /* of a body that does not stand upright: all of them, of the caller; else none */
+    uint32_t point_count;
 } umb_ray_shape;
 
 /* Of at most UMB_RAY_POINTS points. False: all lie behind the cell. umb_ray_shape_outline() has to follow. */

@@ -36,9 +36,10 @@ void umb_region_grain(const umb_region *r, uint32_t *rows, uint32_t *columns)
         return;
     }
     double ratio = sight_of(r) / (r->frames[0].hu + r->frames[0].hv);
-    uint32_t fine = ratio > 128.0 ? 4 : ratio > 32.0 ? 2 : 1;
+    bool none = r->query.up == UMB_UP_NONE;
+    uint32_t fine = ratio > 48.0 && !none ? 8 : ratio > 24.0 ? 4 : ratio > 6.0 ? 2 : 1;
     *columns = n * fine < 4096 ? n * fine : 4096 / n * n;
-    *rows = n * n / 16 / *columns;
+    *rows = n * n / (none ? 16 : 6) / *columns;
     *rows = (*rows + UMB_TILE - 1) / UMB_TILE * UMB_TILE;
     *rows = *rows > side ? (*rows + side - 1) / side * side : *rows;
 }

@@ -2,27 +2,36 @@
 #include <math.h>
 #include <string.h>
 
-#include "base/sort.h"
 #include "geometry/transform.h"
 #include "region_state.h"
 
 /* ---- the queue: a heap of keys, each with what it is for ---------------------------------------- */
 
 /* What is waiting; at equal distances in this order, then by number. */
-typedef enum turn { NODE = 0, OCCLUDER = 1, OBJECT = 2, DRAWING = 3 } turn;
+typedef enum turn { NODE, OCCLUDER, OBJECT, DRAWING, LEAVING } turn;
+
+/* Bits of what is waiting for, and of a distance, which is not negative: it has no use for a sign. */
+#define TURN_BITS 3
+#define NUMBER_BITS 30
 
 static uint64_t order_of(float key, turn what, uint32_t number)
 {
-    return (uint64_t)umb_sort_float(key) << 32 | (uint64_t)what << 30 | number;
+    uint32_t bits;
+    memcpy(&bits, &key, sizeof bits);
+    return ((uint64_t)bits << TURN_BITS | (uint64_t)what) << NUMBER_BITS | number;
 }
 
 static float key_of(uint64_t order)
 {
-    uint32_t bits = (uint32_t)(order >> 32);
-    bits = (bits & 0x80000000u) != 0 ? bits & 0x7FFFFFFFu : ~bits;
+    uint32_t bits = (uint32_t)(order >> (TURN_BITS + NUMBER_BITS));
     float key;
     memcpy(&key, &bits, sizeof key);
     return key;
+}
+
+static turn turn_of(uint64_t order)
+{
+    return (turn)(order >> NUMBER_BITS & ((1u << TURN_BITS) - 1));
 }
 
 static umb_result push(umb_region *r, uint64_t order)
@@ -390,41 +399,56 @@ static umb_aabb node_box(const umb_node *n)
     return box;
 }
 
-/* An occluder is drawn once the walk has come to its far side: what is asked about before that lies beside it or in front of
- * it, and would find intervals joined with it to begin too far away. */
-static umb_result block_later(umb_region *r, const umb_committed *c, uint32_t number)
+/* When the walk has come to the far side of a box. An occluder is drawn then: what is asked about before that lies beside it
+ * or in front of it, and would find intervals joined with it to begin too far away. An object that was seen is asked about
+ * once more then, for what lies in front of it has been drawn by then. */
+static umb_result later(umb_region *r, const umb_aabb *b, turn what, uint32_t number)
 {
-    const umb_aabb *b = &c->occluders[number].bounds;
     double far = 0.0;
     for (uint32_t i = 0; i < r->frame_count; i += 2) {
         uint32_t k = r->frames[i].axis_u;
         far = umb_most(far, umb_most(r->query.min[k] - b->min[k], b->max[k] - r->query.max[k]));
     }
-    return push(r, order_of((float)far, DRAWING, number));
+    return push(r, order_of((float)far, what, number));
 }
 
 static umb_result visit(umb_region *r, const umb_tree *tree, const umb_committed *c, uint64_t order)
 {
-    uint32_t what = (uint32_t)(order >> 30) & 3u, number = (uint32_t)order & UMB_REF_NUMBER;
+    uint32_t number = (uint32_t)order & UMB_REF_NUMBER;
+    turn what = turn_of(order);
     opening open;
-    if (what == DRAWING) {
-        return block(r, &c->occluders[number]);
-    }
     if (what == NODE) {
         const umb_node *n = umb_tree_node(tree, number);
         umb_aabb box = node_box(n);
         return box_hidden(r, &box, &open) ? UMB_OK : push_children(r, n);
     }
+    if (what == DRAWING) {
+        return block(r, &c->occluders[number]);
+    }
     if (what == OCCLUDER) {
         const umb_occluder *o = &c->occluders[number];
-        return box_hidden(r, &o->bounds, &open) ? UMB_OK : block_later(r, c, number);
+        return box_hidden(r, &o->bounds, &open) ? UMB_OK : later(r, &o->bounds, DRAWING, number);
     }
     const umb_object *o = &c->objects[number];
     if (object_hidden(r, o)) {
         return UMB_OK;
     }
+    if (what == OBJECT) {
+        return later(r, &o->bounds, LEAVING, number);
+    }
     r->pvs[r->answer.pvs_count++] = number;
-    return o->occluder != UMB_NONE ? block_later(r, c, o->occluder) : UMB_OK;
+    return o->occluder != UMB_NONE ? block(r, &c->occluders[o->occluder]) : UMB_OK;
+}
+
+/* The walk ends: of what is waiting only objects that were seen before may be seen. */
+static void leave_all(umb_region *r, const umb_committed *c)
+{
+    for (size_t i = 0; i < r->queue_count; ++i) {
+        uint32_t number = (uint32_t)r->queue[i] & UMB_REF_NUMBER;
+        if (turn_of(r->queue[i]) == LEAVING && !object_hidden(r, &c->objects[number])) {
+            r->pvs[r->answer.pvs_count++] = number;
+        }
+    }
 }
 
 /* Nothing that far out can be seen any more, in any direction. */
@@ -463,6 +487,7 @@ umb_result umb_region_walk(umb_region *r)
         if (gap > 1.05f * checked) {
             checked = gap;
             if (all_closed(r, tree, gap)) {
+                leave_all(r, c);
                 break;
             }
         }

@@ -71,6 +71,8 @@ typedef struct umb_umbra_draw {
 typedef struct umb_umbra_query {
     float from[UMB_TILE], to[UMB_TILE];
     float top, bottom, depth; /* upper bound of m, lower bound of M, lower bound of u */
+    bool tilted;                 /* then the first two are here, for each pixel of the rows */
+    float tops[64], bottoms[64];
 } umb_umbra_query;
 
 /* One interval, for lanes from[r] to to[r] of row r of a tile (none: from > to). Names as in umb_umbra_tile. */
@@ -80,12 +82,24 @@ typedef struct umb_umbra_strip {
     float steep; /* as in umb_umbra_draw */
 } umb_umbra_strip;
 
+/* A body's picture from above or from below: y is bounded by lines of a few slopes that touch it. Line l of slope k goes
+ * through corner l; at the middle of pixel (r, j) of the tile it is at[k][l] + r ds[k][l] + j dt[k][l]. */
+#define UMB_UMBRA_CORNERS 16
+typedef struct umb_umbra_picture {
+    uint32_t slope_count, corner_count;
+    float at[UMB_UMBRA_CORNERS][UMB_UMBRA_CORNERS], ds[UMB_UMBRA_CORNERS][UMB_UMBRA_CORNERS], dt[UMB_UMBRA_CORNERS][UMB_UMBRA_CORNERS];
+    float more[UMB_UMBRA_CORNERS]; /* per slope: what y may be above its highest line */
+    float limit;                   /* no y is above it */
+} umb_umbra_picture;
+
 typedef struct umb_umbra_kernels {
     umb_isa isa;
     void (*draw)(umb_umbra_draw *d);
     umb_umbra_summary (*fill)(umb_umbra_tile *tiles, uint32_t umbrae, const umb_umbra_strip *s, bool half);
     /* Pixels of a tile that what is asked about touches and no interval holds. */
     uint64_t (*open)(const umb_umbra_tile *tiles, uint32_t umbrae, const umb_umbra_query *q);
+    /* Bounds of y in pixels of q's rows, times sign, which is 1 or -1. The largest is the answer. */
+    float (*bound)(const umb_umbra_picture *p, const umb_umbra_query *q, float sign, float out[64]);
 } umb_umbra_kernels;
 
 /* Those of isa, which must be available; NULL for one that is not. */

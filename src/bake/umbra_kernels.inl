@@ -145,10 +145,10 @@ UMB_INLINE void corners_of_vector(const umb_umbra *o, bool half, umb_fv row, umb
     }
 }
 
-static void corners_of_row(const umb_umbra *o, bool half, uint32_t columns, float row, corner_values *out)
+static void corners_of_row(const umb_umbra *o, bool half, uint32_t from, uint32_t to, float row, corner_values *out)
 {
     umb_fv r = umb_fv_set(row);
-    for (uint32_t j = 0; j < columns; j += UMB_LANES) {
+    for (uint32_t j = from; j < to; j += UMB_LANES) {
         sums s;
 #if UMB_MUTANT == 1 /* middles of pixels instead of their corners */
         corners_of_vector(o, half, r + 0.5f, lanes_from((float)j + 0.5f), &s);
@@ -386,12 +386,16 @@ static void draw(umb_umbra_draw *d)
 {
     const umb_umbra *o = d->umbra;
     corner_values values[2];
-    uint32_t columns = d->tile_count * UMB_TILE + 1;
-    corners_of_row(o, d->half, columns, 0.0f, &values[0]);
+    uint32_t first = 0, columns = d->tile_count * UMB_TILE + 1;
+    while (d->tiles[first] == NULL) {
+        ++first;
+    }
+    first *= UMB_TILE;
+    corners_of_row(o, d->half, first, columns, 0.0f, &values[0]);
     for (uint32_t r = 0; r < UMB_TILE; ++r) {
         const corner_values *above = &values[r & 1], *below = &values[(r + 1) & 1];
-        corners_of_row(o, d->half, columns, (float)(r + 1), &values[(r + 1) & 1]);
-        for (uint32_t j = 0; j < d->tile_count * UMB_TILE; j += UMB_LANES) {
+        corners_of_row(o, d->half, first, columns, (float)(r + 1), &values[(r + 1) & 1]);
+        for (uint32_t j = first; j < d->tile_count * UMB_TILE; j += UMB_LANES) {
             umb_umbra_tile *tile = d->tiles[j / UMB_TILE];
             if (tile == NULL) {
                 continue;
@@ -434,21 +438,48 @@ static umb_umbra_summary fill(umb_umbra_tile *tiles, uint32_t umbrae, const umb_
 static uint64_t open_pixels(const umb_umbra_tile *tiles, uint32_t umbrae, const umb_umbra_query *q)
 {
     uint64_t open = 0;
-    umb_fv top = umb_fv_set(q->top), bottom = umb_fv_set(q->bottom), depth = umb_fv_set(q->depth);
+    umb_fv depth = umb_fv_set(q->depth);
     for (uint32_t r = 0; r < UMB_TILE; ++r) {
         for (uint32_t j = 0; j < UMB_TILE; j += UMB_LANES) {
-            umb_fv lane = lanes_from((float)j);
+            uint32_t at = r * UMB_TILE + j;
+            umb_fv lane = lanes_from((float)j), top = umb_fv_set(q->top), bottom = umb_fv_set(q->bottom);
             umb_iv asked = (umb_iv)((lane >= q->from[r]) & (lane <= q->to[r]));
+            if (q->tilted && umb_iv_any(asked)) {
+                top = umb_fv_load(q->tops + at);
+                bottom = umb_fv_load(q->bottoms + at);
+            }
             for (uint32_t k = 0; k < umbrae && umb_iv_any(asked); ++k) {
                 const umb_umbra_tile *t = &tiles[k];
-                uint32_t at = r * UMB_TILE + j;
                 asked &= ~(umb_iv)((umb_fv_load(t->top + at) >= top) & (umb_fv_load(t->bottom + at) <= bottom) &
                                    (umb_fv_load(t->depth + at) <= depth));
             }
-            open |= (uint64_t)umb_iv_bits(asked) << (r * UMB_TILE + j);
+            open |= (uint64_t)umb_iv_bits(asked) << at;
         }
     }
     return open;
 }
 
-const umb_umbra_kernels KERNELS = {ISA, draw, fill, open_pixels};
+static float bound(const umb_umbra_picture *p, const umb_umbra_query *q, float sign, float out[64])
+{
+    umb_fv greatest = umb_fv_set(-INFINITY);
+    for (uint32_t r = 0; r < UMB_TILE; ++r) {
+        if (q->from[r] > q->to[r]) {
+            continue;
+        }
+        for (uint32_t j = 0; j < UMB_TILE; j += UMB_LANES) {
+            umb_fv lane = lanes_from((float)j), y = umb_fv_set(p->limit);
+            for (uint32_t k = 0; k < p->slope_count; ++k) {
+                umb_fv line = umb_fv_set(-INFINITY);
+                for (uint32_t i = 0; i < p->corner_count; ++i) {
+                    line = umb_fv_max(line, lane * p->dt[k][i] + ((float)r * p->ds[k][i] + p->at[k][i]));
+                }
+                y = umb_fv_min(y, line + p->more[k]);
+            }
+            greatest = umb_fv_max(greatest, y);
+            umb_fv_store(out + r * UMB_TILE + j, y * sign);
+        }
+    }
+    return -umb_fv_least(-greatest);
+}
+
+const umb_umbra_kernels KERNELS = {ISA, draw, fill, open_pixels, bound};

@@ -1,6 +1,5 @@
-/* `boxfield`: Leyvand's field of boxes of any size up to 100 units and any orientation, in a
- * cube whose size follows their number, with a clearing in its middle. A box counts as twelve
- * polygons. */
+/* `boxfield`: Leyvand's field of boxes of any size up to 100 units and any orientation, with a clearing in its
+ * middle: a cube, or a square of a given height, whose size follows their number. A box counts as twelve polygons. */
 #include <math.h>
 #include <stdio.h>
 
@@ -8,22 +7,27 @@
 
 #define SIDE_MIN 2.0
 #define SIDE_MAX 100.0
-/* Space for each box: about a tenth of the field is filled, and a line of sight ends after some
- * 230 units in the mean. */
+/* Space for each box where none is asked for: about a tenth of the field is filled, and a line of sight ends after
+ * some 230 units in the mean. */
 #define VOLUME_PER_BOX 420000u
 #define CLEARING 100.0 /* radius */
 #define SMALLEST 500u  /* so that the clearing has something around it */
 
 enum { CLEARING_VIEWS = 44, OUTSIDE_VIEWS = 20 };
 
-/* Whole, so that no library's cube root decides. */
-static uint32_t field_size(uint64_t boxes)
+/* How far centres of boxes are spread: along z and x, and along y. */
+typedef struct extent {
+    uint32_t size, height;
+} extent;
+
+/* Whole, so that no library's roots decide. */
+static extent field_extent(const uint64_t *values)
 {
-    uint64_t size = SMALLEST;
-    while (size * size * size < boxes * VOLUME_PER_BOX) {
+    uint64_t volume = (values[0] + 11) / 12 * values[2], height = values[3], size = SMALLEST;
+    while (size * size * (height != 0 ? height : size) < volume) {
         ++size;
     }
-    return (uint32_t)size;
+    return (extent){(uint32_t)size, (uint32_t)(height != 0 ? height : size)};
 }
 
 static double draw_signed(generate_random *r)
@@ -49,7 +53,7 @@ static void draw_unit_vector(generate_random *r, int n, double *v)
 }
 
 /* Box k of the field, as a transform of the unit cube around zero. */
-static umb_transform draw_box(uint64_t seed, uint32_t k, uint32_t size)
+static umb_transform draw_box(uint64_t seed, uint32_t k, extent field)
 {
     generate_random r = generate_stream(seed, k, 0);
     double q[4], side[3], centre[3], diagonal = 0.0, distance;
@@ -63,7 +67,7 @@ static umb_transform draw_box(uint64_t seed, uint32_t k, uint32_t size)
     do {
         distance = 0.0;
         for (int i = 0; i < 3; ++i) {
-            centre[i] = 0.5 * size * draw_signed(&r);
+            centre[i] = 0.5 * (i == 1 ? field.height : field.size) * draw_signed(&r);
             distance += centre[i] * centre[i];
         }
     } while (distance < keep * keep);
@@ -84,7 +88,8 @@ static umb_transform draw_box(uint64_t seed, uint32_t k, uint32_t size)
 
 static bool boxfield_model(const uint64_t *values, model *m)
 {
-    uint32_t boxes = (uint32_t)((values[0] + 11) / 12), size = field_size(boxes);
+    uint32_t boxes = (uint32_t)((values[0] + 11) / 12);
+    extent field = field_extent(values);
     const double min[3] = {-0.5, -0.5, -0.5}, max[3] = {0.5, 0.5, 0.5};
     generate_mesh g = {0};
     generate_box(&g, min, max);
@@ -92,7 +97,7 @@ static bool boxfield_model(const uint64_t *values, model *m)
     generate_mesh_free(&g);
     for (uint32_t k = 0; k < boxes && mesh != MODEL_NONE; ++k) {
         char name[24];
-        umb_transform t = draw_box(values[1], k, size);
+        umb_transform t = draw_box(values[1], k, field);
         snprintf(name, sizeof name, "box %u", k);
         if (model_add_object(m, name, mesh, &t) == MODEL_NONE) {
             return false;
@@ -104,16 +109,16 @@ static bool boxfield_model(const uint64_t *values, model *m)
 /* From within the clearing in all directions, then from outside towards the middle. */
 static bool boxfield_path(const uint64_t *values, camera_path *out)
 {
-    uint32_t size = field_size((values[0] + 11) / 12);
+    extent field = field_extent(values);
     generate_random r = generate_stream(values[1], -1, 0);
     for (int v = 0; v < CLEARING_VIEWS + OUTSIDE_VIEWS; ++v) {
         double place[3], look[3], eye[3], target[3];
-        double reach = v < CLEARING_VIEWS ? 0.8 * CLEARING * generate_unit(&r) : 1.2 * size;
+        double reach = v < CLEARING_VIEWS ? 0.8 * CLEARING * generate_unit(&r) : 1.2 * field.size;
         draw_unit_vector(&r, 3, place);
         draw_unit_vector(&r, 3, look);
         for (int i = 0; i < 3; ++i) {
             eye[i] = reach * place[i];
-            target[i] = v < CLEARING_VIEWS ? eye[i] + 100.0 * look[i] : 0.3 * size * look[i];
+            target[i] = v < CLEARING_VIEWS ? eye[i] + 100.0 * look[i] : 0.3 * (i == 1 ? field.height : field.size) * look[i];
         }
         if (!generate_look(out, eye, target)) {
             return false;
@@ -124,6 +129,7 @@ static bool boxfield_path(const uint64_t *values, camera_path *out)
 
 const generate_kind generate_boxfield = {
     "boxfield",
-    {{"polygons", 200000, 12, 100000000}, {"seed", 1, 0, UINT32_MAX}},
+    {{"polygons", 200000, 12, 100000000}, {"seed", 1, 0, UINT32_MAX}, {"space", VOLUME_PER_BOX, 1, 10000000},
+     {"height", 0, 0, 1000000}},
     boxfield_model,
     boxfield_path};
