@@ -346,6 +346,30 @@ static void test_boxfield(void **state)
     camera_path_free(&p);
 }
 
+/* A field of a given height is a square as large as its boxes need. */
+static void test_flat_boxfield(void **state)
+{
+    (void)state;
+    model *m = make("gen:boxfield,polygons=60k,space=40k,height=100");
+    double most[3] = {0.0};
+    for (uint32_t o = 0; o < m->object_count; ++o) {
+        for (int k = 0; k < 3; ++k) {
+            most[k] = fmax(most[k], fabs((double)m->objects[o].transform.m[k][3]));
+        }
+    }
+    double side = sqrt(5000 * 40000.0 / 100.0); /* 1,414.2 */
+    assert_true(most[1] < 50.01 && most[1] > 49.5);
+    for (int k = 0; k < 3; k += 2) {
+        assert_true(most[k] < 0.5 * side + 1.0 && most[k] > 0.5 * side - 20.0);
+    }
+    model_free(m);
+    camera_path p;
+    umb_error error;
+    assert_true(generate_path("gen:boxfield,polygons=60k,space=40k,height=100", &p, &error));
+    assert_int_equal(p.count, 64);
+    camera_path_free(&p);
+}
+
 /* The end of one wall piece is met by the pieces beside it: each corner of a panel's ends is a
  * corner of another wall piece too. */
 static void test_building_walls_meet(void **state)
@@ -462,6 +486,7 @@ int main(void)
         cmocka_unit_test(test_blocks_recipe),       cmocka_unit_test(test_blocks_path),
         cmocka_unit_test(test_city_floors_meet),    cmocka_unit_test(test_city_counts),
         cmocka_unit_test(test_city_path),           cmocka_unit_test(test_boxfield),
+        cmocka_unit_test(test_flat_boxfield),
         cmocka_unit_test(test_building_walls_meet), cmocka_unit_test(test_building_path),
         cmocka_unit_test(test_determinism),         cmocka_unit_test(test_bad_specs),
     };

@@ -233,14 +233,13 @@ typedef struct hunt {
     uint32_t cells;
 } hunt;
 
-/* Four long walls around the middle, leaning a little, and small boxes beyond them at all heights. */
-static model *make_walls(void)
+/* A cube of side one around zero; out: the mesh's number. */
+static model *model_with_cube(uint32_t *out)
 {
     static const uint32_t faces[12][3] = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
                                           {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
     float corners[8][3];
     uint8_t flags[12] = {0};
-    dice d = {5};
     for (int c = 0; c < 8; ++c) {
         for (int k = 0; k < 3; ++k) {
             corners[c][k] = (c >> k & 1) != 0 ? 0.5f : -0.5f;
@@ -248,8 +247,17 @@ static model *make_walls(void)
     }
     model_mesh mesh = {&corners[0][0], (uint32_t *)faces, flags, 8, 12};
     model *m = model_create();
+    *out = model_add_mesh(m, &mesh);
+    return m;
+}
+
+/* Four long walls around the middle, leaning a little, and small boxes beyond them at all heights. */
+static model *make_walls(void)
+{
     umb_error error;
-    uint32_t cube = model_add_mesh(m, &mesh);
+    uint32_t cube;
+    model *m = model_with_cube(&cube);
+    dice d = {5};
     for (int i = 0; i < 4; ++i) {
         float c = i % 2 == 0 ? 1.0f : 0.0f, sign = i < 2 ? 1.0f : -1.0f, lean = 0.3f * (float)i;
         umb_transform t = {{{80 * c + 2 * (1 - c), 0, lean, 30 * sign * (1 - c)},
@@ -311,6 +319,44 @@ static void test_mutants(void **state)
         bad += wrong == 0 ? 1 : 0;
     }
     assert_int_equal(bad, 0);
+}
+
+/* ---- the walk's end ------------------------------------------------------------------------------ */
+
+/* Eight walls in two rings around a cell shut everything out that lies beyond. A beam that reaches from inside far out through
+ * one of them is seen all the same, though the walk ends long before its far side. */
+static void test_beam(void **state)
+{
+    (void)state;
+    umb_error error;
+    uint32_t cube, beam;
+    model *m = model_with_cube(&cube);
+    for (int i = 0; i < 8; ++i) {
+        double angle = i * 0.785398163397448, c = cos(angle), s = sin(angle), far = i % 2 == 0 ? 22 : 34;
+        umb_transform wall = {{{(float)(2 * c), 0, (float)(-56 * s), (float)(far * c)},
+                               {0, 80, 0, 0},
+                               {(float)(2 * s), 0, (float)(56 * c), (float)(far * s)}}};
+        (void)model_add_object(m, "wall", cube, &wall);
+    }
+    beam = m->object_count;
+    (void)model_add_object(m, "beam", cube, &(umb_transform){{{400, 0, 0, 210}, {0, 1, 0, 0}, {0, 0, 1, 0}}});
+    for (int i = 0; i < 100; ++i) {
+        (void)model_add_object(m, "box", cube, &(umb_transform){{{4, 0, 0, (float)(100 + 5 * i)}, {0, 4, 0, 10}, {0, 0, 4, 30}}});
+    }
+    assert_true(model_finish(m, NULL, &error));
+    world w;
+    open_model(&w, m, true, false);
+    umb_region_query q = {.min = {-2, -1, -2}, .max = {2, 1, 2}, .up = UMB_UP_Y};
+    umb_region_answer a;
+    assert_int_equal(umb_region_solve(w.region, &q, &a), UMB_OK);
+    assert_true(w.region->queue_count > 0); /* it ended early */
+    bool found = false;
+    for (uint32_t i = 0; i < a.pvs_count; ++i) {
+        found = found || a.pvs[i] == beam;
+        assert_true(a.pvs[i] <= beam);
+    }
+    assert_true(found);
+    close_world(&w);
 }
 
 /* ---- cells of every kind ------------------------------------------------------------------------ */
@@ -530,6 +576,7 @@ int main(int count, char **words)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_city),
+        cmocka_unit_test(test_beam),
         cmocka_unit_test(test_boxfield),
         cmocka_unit_test(test_building),
         cmocka_unit_test(test_blocks),
