@@ -172,7 +172,7 @@ static umb_result find_bodies(umb_region *r)
         const umb_occluder *o = &c->occluders[r->used[i]];
         bool added;
         result = umb_solids_add(&r->solids, o, r->used[i], corners, &added);
-        if (result == UMB_OK && !added && r->known[r->used[i]] == UMB_SOLID_YES) {
+        if (result == UMB_OK && !added) {
             result = umb_solids_add_inner(&r->solids, o, r->used[i], corners);
         }
     }

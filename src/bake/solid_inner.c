@@ -286,7 +286,18 @@ static umb_result add_body(umb_solids *s, const inner *in, const face *f, double
     return UMB_OK;
 }
 
-/* The occluder is known to be a solid. */
+/* Along every edge as many triangles run one way as the other: then the winding number around a point is the same in all of
+ * each part of space that the surface leaves free, and nought outside. */
+static bool is_closed(const umb_mesh *m)
+{
+    for (uint32_t i = 0; i < m->edge_count; ++i) {
+        if (m->edges[i].f1 == UMB_NONE || (m->edges[i].f1 & UMB_EDGE_SAME) != 0) {
+            return false;
+        }
+    }
+    return m->triangle_count >= 4;
+}
+
 static bool begin(inner *in, const umb_solids *s, const umb_occluder *o, const double box[8][3])
 {
     *in = (inner){.occluder = o, .mesh = o->mesh};
@@ -297,7 +308,8 @@ static bool begin(inner *in, const umb_solids *s, const umb_occluder *o, const d
     }
     /* Values of planes are right to 2^-48 of the reach; half a step is far more. */
     in->step = 0x1p-18 * in->size;
-    if (!apart || in->mesh->block_position_count > UMB_CLOSED_SOLID_MOST || !(in->step > 0x1p-40 * s->reach)) {
+    if (!apart || in->mesh->block_position_count > UMB_CLOSED_SOLID_MOST ||
+        in->mesh->triangle_count > UMB_CLOSED_SOLID_MOST || !is_closed(in->mesh) || !(in->step > 0x1p-40 * s->reach)) {
         return false;
     }
     for (uint32_t i = 0; i < in->mesh->block_position_count; ++i) {
