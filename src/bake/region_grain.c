@@ -3,6 +3,8 @@
 
 #include "region_state.h"
 
+#define MOST_COLUMNS 8192
+
 /* What a ray goes through in the mean before it ends, were the scene's objects spread evenly over its bounds: a body's
  * shadow is a quarter of its surface, averaged over all directions. */
 static double free_path(const umb_region *r, const umb_aabb *b)
@@ -37,9 +39,9 @@ void umb_region_grain(const umb_region *r, uint32_t *rows, uint32_t *columns)
     }
     double ratio = sight_of(r) / (r->frames[0].hu + r->frames[0].hv);
     bool none = r->query.up == UMB_UP_NONE;
-    uint32_t fine = ratio > 48.0 && !none ? 8 : ratio > 24.0 ? 4 : ratio > 6.0 ? 2 : 1;
-    *columns = n * fine < 4096 ? n * fine : 4096 / n * n;
-    *rows = n * n / (none ? 16 : 6) / *columns;
+    uint32_t fine = ratio > 48.0 && !none ? 16 : ratio > 24.0 ? 4 : ratio > 6.0 ? 2 : 1;
+    *columns = n * fine < MOST_COLUMNS ? n * fine : MOST_COLUMNS / n * n;
+    *rows = n * n / (none ? 16 : 5) / *columns;
     *rows = (*rows + UMB_TILE - 1) / UMB_TILE * UMB_TILE;
     *rows = *rows > side ? (*rows + side - 1) / side * side : *rows;
 }
