@@ -42,6 +42,6 @@ void umb_region_grain(const umb_region *r, uint32_t *rows, uint32_t *columns)
     uint32_t fine = ratio > 48.0 && !none ? 16 : ratio > 24.0 ? 4 : ratio > 6.0 ? 2 : 1;
     *columns = n * fine < MOST_COLUMNS ? n * fine : MOST_COLUMNS / n * n;
     *rows = n * n / (none ? 16 : 5) / *columns;
-    *rows = (*rows + UMB_TILE - 1) / UMB_TILE * UMB_TILE;
+    *rows = *rows <= UMB_TILE ? UMB_TILE : (*rows + UMB_TILE - 1) / UMB_TILE * UMB_TILE;
     *rows = *rows > side ? (*rows + side - 1) / side * side : *rows;
 }
