@@ -28,8 +28,31 @@ static double sight_of(const umb_region *r)
     return gap + 5.0 * free_path(r, b);
 }
 
+/* How far away the scene's farthest side is. */
+static double extent_of(const umb_region *r)
+{
+    const umb_aabb *b = &umb_index_tree(r->index)->bounds;
+    double far = 0.0;
+    for (uint32_t i = 0; i < r->frame_count; i += 2) {
+        uint32_t k = r->frames[i].axis_u;
+        far = fmax(far, fmax(r->query.min[k] - b->min[k], b->max[k] - r->query.max[k]));
+    }
+    return far;
+}
+
 /* Lines of a slab's pixel are a beam as wide as its step in offset and its step in slope times the distance: for the same
- * number of pixels it is thinnest, where things are seen, when both are equal. Answers do not depend on being right. */
+ * number of pixels it is thinnest, where things are seen, when both are equal. Answers do not depend on being right; the limits
+ * are those that left the smallest sets in cities and box fields of all sizes. */
+static uint32_t fineness(const umb_region *r, bool none)
+{
+    double size = r->frames[0].hu + r->frames[0].hv, sight = sight_of(r) / size, extent = extent_of(r) / (48.0 * size);
+    uint32_t fine = sight > 48.0 && !none ? 16 : sight > 24.0 ? 4 : sight > 6.0 ? 2 : 1;
+    while (fine > 1 && fine > extent) {
+        fine /= 2;
+    }
+    return fine;
+}
+
 void umb_region_grain(const umb_region *r, uint32_t *rows, uint32_t *columns)
 {
     uint32_t n = r->query.resolution, side = UMB_TILE * UMB_TILE;
@@ -37,10 +60,10 @@ void umb_region_grain(const umb_region *r, uint32_t *rows, uint32_t *columns)
     if (r->query.outer != 0.0) {
         return;
     }
-    double ratio = sight_of(r) / (r->frames[0].hu + r->frames[0].hv);
     bool none = r->query.up == UMB_UP_NONE;
-    uint32_t fine = ratio > 48.0 && !none ? 16 : ratio > 24.0 ? 4 : ratio > 6.0 ? 2 : 1;
-    *columns = n * fine < MOST_COLUMNS ? n * fine : MOST_COLUMNS / n * n;
+    uint32_t fine = fineness(r, none), most = n * n / 4 / UMB_TILE; /* a quarter of n x n pixels in one row of tiles */
+    most = most < MOST_COLUMNS ? most : MOST_COLUMNS;
+    *columns = n * fine < most ? n * fine : most / side * side;
     *rows = n * n / (none ? 16 : 5) / *columns;
     *rows = *rows <= UMB_TILE ? UMB_TILE : (*rows + UMB_TILE - 1) / UMB_TILE * UMB_TILE;
     *rows = *rows > side ? (*rows + side - 1) / side * side : *rows;
