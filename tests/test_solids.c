@@ -596,7 +596,7 @@ static void make_wall(dice *d, const double at[3], double wide, double far, bool
 
 static umb_beam_part draw_part(dice *d, double x)
 {
-    umb_beam_part p = {{x, dice_between(d, -2, 2), dice_between(d, -2, 2)}, {{0}}};
+    umb_beam_part p = {{x, dice_between(d, -2, 2), dice_between(d, -2, 2)}, {{0}}, false};
     bool flat = dice_roll(d, 4) == 0, turned = dice_roll(d, 2) == 0;
     for (int a = 0; a < 3; ++a) {
         for (int k = 0; k < 3; ++k) {
@@ -609,8 +609,39 @@ static umb_beam_part draw_part(dice *d, double x)
     return p;
 }
 
+static umb_beam_part draw_triangle(dice *d, double x)
+{
+    double p[3][3];
+    bool thin = dice_roll(d, 4) == 0;
+    for (int c = 0; c < 3; ++c) {
+        for (int k = 0; k < 3; ++k) {
+            p[c][k] = thin && c == 2 ? 0.5 * (p[0][k] + p[1][k]) + dice_between(d, -1e-4, 1e-4)
+                                     : (k == 0 ? x : 0.0) + dice_between(d, -2, 2);
+        }
+    }
+    return umb_beam_triangle((const double(*)[3])p);
+}
+
+/* A corner, or any point. */
+static void point_of_triangle(dice *d, const umb_beam_part *p, double out[3])
+{
+    double weights[3] = {dice_between(d, 0, 1), dice_between(d, 0, 1), dice_between(d, 0, 1)};
+    if (dice_roll(d, 3) == 0) {
+        memset(weights, 0, sizeof weights);
+        weights[dice_roll(d, 3)] = 1.0;
+    }
+    double sum = weights[0] + weights[1] + weights[2];
+    for (int k = 0; k < 3; ++k) {
+        out[k] = (weights[0] * p->middle[k] + weights[1] * p->axes[0][k] + weights[2] * p->axes[1][k]) / sum;
+    }
+}
+
 static void point_of_part(dice *d, const umb_beam_part *p, double out[3])
 {
+    if (p->triangle) {
+        point_of_triangle(d, p, out);
+        return;
+    }
     bool corner = dice_roll(d, 3) == 0;
     memcpy(out, p->middle, 3 * sizeof *out);
     for (int a = 0; a < 3; ++a) {
@@ -628,7 +659,8 @@ static void test_beams(void **state)
     dice d = {75};
     uint32_t all[5] = {0, 1, 2, 3, 4}, blocked = 0, tries = times(1500);
     for (uint32_t n = 0; n < tries; ++n) {
-        umb_beam_part a = draw_part(&d, 0.0), b = draw_part(&d, dice_between(&d, 12, 40));
+        double far = dice_between(&d, 12, 40);
+        umb_beam_part a = draw_part(&d, 0.0), b = dice_roll(&d, 2) == 0 ? draw_part(&d, far) : draw_triangle(&d, far);
         double from[3], to[3], at[3], part = dice_between(&d, 0.3, 0.7), wide = exp(dice_between(&d, log(1e-3), log(0.7)));
         point_of_part(&d, &a, from);
         point_of_part(&d, &b, to);

@@ -6,9 +6,13 @@
 #define LEAST_PART 0x1p-19
 #define TRIALS 96
 
+/* Of a triangle each corner several times. */
 static void corners_of(const umb_beam_part *p, double out[8][3])
 {
-    for (int c = 0; c < 8; ++c) {
+    for (int c = 0; c < 8 && p->triangle; ++c) {
+        memcpy(out[c], c % 3 == 0 ? p->middle : p->axes[c % 3 - 1], sizeof out[c]);
+    }
+    for (int c = 0; c < 8 && !p->triangle; ++c) {
         for (int k = 0; k < 3; ++k) {
             double x = p->middle[k];
             for (int a = 0; a < 3; ++a) {
@@ -24,23 +28,39 @@ static double length_squared(const double v[3])
     return v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
 }
 
+/* Of a triangle half the edge from its corner a to the next. */
+static double axis_squared(const umb_beam_part *p, int a)
+{
+    if (!p->triangle) {
+        return length_squared(p->axes[a]);
+    }
+    const double *from = a == 0 ? p->middle : p->axes[a - 1], *to = a == 2 ? p->middle : p->axes[a];
+    double half[3] = {0.5 * (to[0] - from[0]), 0.5 * (to[1] - from[1]), 0.5 * (to[2] - from[2])};
+    return length_squared(half);
+}
+
 static int longest_axis(const umb_beam_part *p, double *length)
 {
     int longest = 0;
     for (int a = 1; a < 3; ++a) {
-        longest = length_squared(p->axes[a]) > length_squared(p->axes[longest]) ? a : longest;
+        longest = axis_squared(p, a) > axis_squared(p, longest) ? a : longest;
     }
-    *length = length_squared(p->axes[longest]);
+    *length = axis_squared(p, longest);
     return longest;
 }
 
-/* Half of a part along an axis; halves overlap by far more than rounding can part them. */
+/* Half of a part along an axis; halves of boxes overlap by far more than rounding can part them. */
 static umb_beam_part half_of(const umb_beam_part *p, int axis, double side)
 {
     umb_beam_part h = *p;
+    double *from = axis == 0 ? h.middle : h.axes[axis - 1], *to = axis == 2 ? h.middle : h.axes[axis];
     for (int k = 0; k < 3; ++k) {
-        h.axes[axis][k] = 0.5 * p->axes[axis][k] * (1.0 + 0x1p-24);
-        h.middle[k] = p->middle[k] + side * 0.5 * p->axes[axis][k];
+        if (p->triangle) {
+            *(side < 0.0 ? &to[k] : &from[k]) = 0.5 * (from[k] + to[k]);
+        } else {
+            h.axes[axis][k] = 0.5 * p->axes[axis][k] * (1.0 + 0x1p-24);
+            h.middle[k] = p->middle[k] + side * 0.5 * p->axes[axis][k];
+        }
     }
     return h;
 }
@@ -65,11 +85,19 @@ void umb_beam_bounds(const umb_beam_part *p, double min[3], double max[3])
 
 umb_beam_part umb_beam_box(const double min[3], const double max[3], double more)
 {
-    umb_beam_part p = {{0.0}, {{0.0}}};
+    umb_beam_part p = {.triangle = false};
     for (int k = 0; k < 3; ++k) {
         p.middle[k] = 0.5 * (min[k] + max[k]);
         p.axes[k][k] = fmax(max[k] - p.middle[k], p.middle[k] - min[k]) + more;
     }
+    return p;
+}
+
+umb_beam_part umb_beam_triangle(const double corners[3][3])
+{
+    umb_beam_part p = {.triangle = true};
+    memcpy(p.middle, corners[0], sizeof p.middle);
+    memcpy(p.axes, corners[1], 2 * sizeof p.axes[0]);
     return p;
 }
 
@@ -155,6 +183,15 @@ static __attribute__((noinline)) verdict look_at(const umb_solids *solids, const
 /* A point of a part: six numbers in [-1, 1) make a segment. */
 static void point_of(const umb_beam_part *p, const double share[3], double out[3])
 {
+    double u = 0.5 + 0.5 * share[0], v = 0.5 + 0.5 * share[1], over = u + v > 1.0 ? 1.0 : 0.0;
+    u = over + (1.0 - 2.0 * over) * u;
+    v = over + (1.0 - 2.0 * over) * v;
+    for (int k = 0; k < 3 && p->triangle; ++k) {
+        out[k] = p->middle[k] + u * (p->axes[0][k] - p->middle[k]) + v * (p->axes[1][k] - p->middle[k]);
+    }
+    if (p->triangle) {
+        return;
+    }
     for (int k = 0; k < 3; ++k) {
         out[k] = p->middle[k] + share[0] * p->axes[0][k] + share[1] * p->axes[1][k] + share[2] * p->axes[2][k];
     }

@@ -29,7 +29,7 @@ static umb_beam_part part_of_object(const umb_object *o, double reach)
     if (!o->refine || o->identity) {
         return p;
     }
-    umb_beam_part turned = {{0.0}, {{0.0}}};
+    umb_beam_part turned = {.triangle = false};
     double lengths[3];
     for (int a = 0; a < 3; ++a) {
         double half = 0.5 * ((double)o->mesh->bounds.max[a] - o->mesh->bounds.min[a]);
@@ -66,40 +66,6 @@ typedef struct refinement {
 
 enum { STAYS = 0, HIDDEN = 1, UNDECIDED = 2 };
 
-/* The least rectangle around a triangle that has a side along one of its edges, and `more` of it in all directions. Sums
- * here are right to 2^-48 of the reach where the triangle has an area to speak of; others have their box. */
-static umb_beam_part part_of_triangle(const double p[3][3], double more)
-{
-    double min[3], max[3], least = INFINITY;
-    for (int k = 0; k < 3; ++k) {
-        min[k] = fmin(p[0][k], fmin(p[1][k], p[2][k]));
-        max[k] = fmax(p[0][k], fmax(p[1][k], p[2][k]));
-    }
-    umb_beam_part best = umb_beam_box(min, max, more);
-    for (int e = 0; e < 3; ++e) {
-        umb_vec3 a = umb_vec3_from_double(p[e]), along = umb_vec3_sub(umb_vec3_from_double(p[(e + 1) % 3]), a);
-        umb_vec3 third = umb_vec3_sub(umb_vec3_from_double(p[(e + 2) % 3]), a);
-        double length = umb_vec3_length(along);
-        if (!(length > 1024.0 * more)) {
-            continue;
-        }
-        double at = umb_vec3_dot(along, third) / (length * length), low = fmin(0.0, at), high = fmax(1.0, at);
-        umb_vec3 out = umb_vec3_sub(third, umb_vec3_scale(along, at));
-        double height = umb_vec3_length(out), size = (high - low) * length * height;
-        if (!(height > 1024.0 * more) || !(size < least)) {
-            continue;
-        }
-        least = size;
-        umb_vec3 middle = umb_vec3_add(a, umb_vec3_add(umb_vec3_scale(along, 0.5 * (low + high)), umb_vec3_scale(out, 0.5)));
-        umb_vec3 axes[3] = {umb_vec3_scale(along, 0.5 * (high - low) + 2.0 * more / length),
-                            umb_vec3_scale(out, 0.5 + 2.0 * more / height),
-                            umb_vec3_scale(umb_vec3_cross(along, out), 2.0 * more / (length * height))};
-        best = (umb_beam_part){{middle.x, middle.y, middle.z}, {{axes[0].x, axes[0].y, axes[0].z},
-                               {axes[1].x, axes[1].y, axes[1].z}, {axes[2].x, axes[2].y, axes[2].z}}};
-    }
-    return best;
-}
-
 static uint8_t decide_part(const refinement *f, const umb_beam_part *target, uint32_t *effort)
 {
     const umb_solids *solids = &f->region->solids;
@@ -135,7 +101,7 @@ static uint8_t decide_triangles(const refinement *f, const umb_object *o)
                 p[c][k] = w[k];
             }
         }
-        umb_beam_part target = part_of_triangle((const double(*)[3])p, UMB_BEAM_MARGIN * f->region->reach);
+        umb_beam_part target = umb_beam_triangle((const double(*)[3])p);
         uint8_t state = decide_part(f, &target, &effort);
         if (state != HIDDEN) {
             return state;
