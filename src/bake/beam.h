@@ -19,7 +19,7 @@ typedef struct umb_beam_part {
  * more than values of their planes are off. */
 #define UMB_BEAM_MARGIN 0x1p-44
 
-#define UMB_BEAM_BODIES 256
+#define UMB_BEAM_BODIES 2048
 
 umb_beam_part umb_beam_box(const double min[3], const double max[3], double more);
 umb_beam_part umb_beam_triangle(const double corners[3][3]);
