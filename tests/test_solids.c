@@ -657,8 +657,9 @@ static void test_beams(void **state)
 {
     (void)state;
     dice d = {75};
-    uint32_t all[5] = {0, 1, 2, 3, 4}, blocked = 0, tries = times(1500);
+    uint32_t blocked = 0, tries = times(1500);
     for (uint32_t n = 0; n < tries; ++n) {
+        uint32_t all[5] = {0, 1, 2, 3, 4};
         double far = dice_between(&d, 12, 40);
         umb_beam_part a = draw_part(&d, 0.0), b = dice_roll(&d, 2) == 0 ? draw_part(&d, far) : draw_triangle(&d, far);
         double from[3], to[3], at[3], part = dice_between(&d, 0.3, 0.7), wide = exp(dice_between(&d, log(1e-3), log(0.7)));

@@ -118,7 +118,7 @@ static bool blocks_segment(const looked_at *l, const uint32_t *bodies, uint32_t 
 }
 
 /* One segment after another: who blocks it is asked about the others too. Most of what can be seen shows in the first
- * few. Kept bodies come in the order of what they block. */
+ * few. What blocks most comes first then. */
 static verdict look(looked_at *l, uint32_t *bodies, uint32_t count)
 {
     uint64_t blocked = 0;
@@ -160,8 +160,9 @@ static verdict look(looked_at *l, uint32_t *bodies, uint32_t count)
     return SHARED;
 }
 
+/* Bodies that may meet a segment of the beam come first: *n of them. */
 static __attribute__((noinline)) verdict look_at(const umb_solids *solids, const umb_beam_part *a, const umb_beam_part *b,
-                                                 const uint32_t *bodies, uint32_t count, uint32_t *kept, uint32_t *n)
+                                                 uint32_t *bodies, uint32_t count, uint32_t *n)
 {
     looked_at l = {.solids = solids};
     double min[2][3], max[2][3];
@@ -173,11 +174,13 @@ static __attribute__((noinline)) verdict look_at(const umb_solids *solids, const
     umb_shaft_make(&shaft, (const double(*)[3])min, (const double(*)[3])max);
     *n = 0;
     for (uint32_t i = 0; i < count; ++i) {
-        if (!umb_shaft_beside(&shaft, &solids->items[bodies[i]].bounds)) {
-            kept[(*n)++] = bodies[i];
+        uint32_t body = bodies[i];
+        if (!umb_shaft_beside(&shaft, &solids->items[body].bounds)) {
+            bodies[i] = bodies[*n];
+            bodies[(*n)++] = body;
         }
     }
-    return look(&l, kept, *n);
+    return look(&l, bodies, *n);
 }
 
 /* A point of a part: six numbers in [-1, 1) make a segment. */
@@ -227,16 +230,16 @@ static bool trials_blocked(const umb_solids *solids, const umb_beam_part *a, con
 
 /* Whatever of the segments between corners no body meets will still be there in some part, however small: then it is no
  * use to go on. */
-static bool blocked(umb_beam_search *s, const umb_beam_part *a, const umb_beam_part *b, const uint32_t *bodies, uint32_t count,
+static bool blocked(umb_beam_search *s, const umb_beam_part *a, const umb_beam_part *b, uint32_t *bodies, uint32_t count,
                     bool whole)
 {
-    uint32_t kept[UMB_BEAM_BODIES], n;
+    uint32_t n;
     if (s->effort == 0) {
         return false;
     }
     s->effort -= 1;
-    verdict v = look_at(s->solids, a, b, bodies, count, kept, &n);
-    if (v != SHARED || (whole && !trials_blocked(s->solids, a, b, kept, n))) {
+    verdict v = look_at(s->solids, a, b, bodies, count, &n);
+    if (v != SHARED || (whole && !trials_blocked(s->solids, a, b, bodies, n))) {
         return v == BLOCKED;
     }
     double la, lb, least = LEAST_PART * s->solids->reach;
@@ -246,14 +249,14 @@ static bool blocked(umb_beam_search *s, const umb_beam_part *a, const umb_beam_p
     }
     for (int side = -1; side <= 1; side += 2) {
         umb_beam_part half = la > lb ? half_of(a, axis_a, side) : half_of(b, axis_b, side);
-        if (!blocked(s, la > lb ? &half : a, la > lb ? b : &half, kept, n, false)) {
+        if (!blocked(s, la > lb ? &half : a, la > lb ? b : &half, bodies, n, false)) {
             return false;
         }
     }
     return true;
 }
 
-bool umb_beam_blocked(umb_beam_search *s, const umb_beam_part *a, const umb_beam_part *b, const uint32_t *bodies, uint32_t count)
+bool umb_beam_blocked(umb_beam_search *s, const umb_beam_part *a, const umb_beam_part *b, uint32_t *bodies, uint32_t count)
 {
     return blocked(s, a, b, bodies, count, true);
 }

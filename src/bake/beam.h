@@ -19,7 +19,7 @@ typedef struct umb_beam_part {
  * more than values of their planes are off. */
 #define UMB_BEAM_MARGIN 0x1p-44
 
-#define UMB_BEAM_BODIES 2048
+#define UMB_BEAM_BODIES 1024
 
 umb_beam_part umb_beam_box(const double min[3], const double max[3], double more);
 umb_beam_part umb_beam_triangle(const double corners[3][3]);
@@ -30,9 +30,8 @@ typedef struct umb_beam_search {
     uint32_t effort; /* beams that may still be looked at */
 } umb_beam_search;
 
-/* True if every segment from a to b is blocked. bodies: those that may meet one, at most UMB_BEAM_BODIES. False with
- * effort 0: not decided. */
-bool umb_beam_blocked(umb_beam_search *s, const umb_beam_part *a, const umb_beam_part *b, const uint32_t *bodies,
-                      uint32_t count);
+/* True if every segment from a to b is blocked. bodies: those that may meet one, at most UMB_BEAM_BODIES; their order is
+ * changed. False with effort 0: not decided. */
+bool umb_beam_blocked(umb_beam_search *s, const umb_beam_part *a, const umb_beam_part *b, uint32_t *bodies, uint32_t count);
 
 #endif
