@@ -4,7 +4,7 @@
 
 #include "solid.h"
 
-/* Add, for each flat convex face of an occluder that umb_closed_solid() has proved to be a solid, what lies behind the face as
+/* Add, for each flat convex face of an occluder whose surface is closed, what the surface goes round of what lies behind it, as
  * deep as nothing else of the surface comes in: the wings of a building. Bodies overlap where wings meet. The cell (its
  * corners) must be outside the occluder's bounds, else nothing is added. */
 umb_result umb_solids_add_inner(umb_solids *s, const umb_occluder *o, uint32_t number, const double box[8][3]);
