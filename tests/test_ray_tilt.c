@@ -57,9 +57,12 @@ static bool tile_at(const umb_ray_map *m, const umb_ray_point *p, double s, uint
 {
     double t = (p->v - (m->alpha0 + m->alpha1 * p->u) * s) / (m->beta0 + m->beta1 * p->u);
     double row = floor((s - m->s0) / (UMB_TILE * m->ds)), column = floor((t - m->t0) / (UMB_TILE * m->dt));
+    if (!(row >= 0 && column >= 0 && row < m->rows && column < m->columns)) {
+        return false;
+    }
     *i = (uint32_t)row;
     *j = (uint32_t)column;
-    return row >= 0 && column >= 0 && row < m->rows && column < m->columns;
+    return true;
 }
 
 typedef struct tally {
@@ -94,7 +97,7 @@ static void check_points(const umb_ray_tilt *a, const umb_umbra_query *q, dice *
         double s = a->s + UMB_TILE * m->ds * between(d, 0, 1);
         double t = (p.v - (m->alpha0 + m->alpha1 * p.u) * s) / (m->beta0 + m->beta1 * p.u);
         double column = floor((t - a->t) / m->dt);
-        uint32_t r = (uint32_t)((s - a->s) / m->ds);
+        uint32_t r = (uint32_t)fmin(UMB_TILE - 1, (s - a->s) / m->ds);
         if (!(column >= 0 && column < UMB_TILE)) {
             continue;
         }
