@@ -11,6 +11,7 @@
 
 #include "bake/ray_tilt.h"
 #include "support/failing.h"
+#include "support/ray_bodies.h"
 
 enum { CORNERS = 8 };
 
@@ -20,23 +21,18 @@ static bool is_small(void)
     return size != NULL && strcmp(size, "small") == 0;
 }
 
-static double between(dice *d, double low, double high)
-{
-    return low + (high - low) * (dice_roll(d, 1u << 30) / (double)(1u << 30));
-}
-
 /* Eight corners anywhere: any convex body will do. One in four is as thin as a needle or a leaf. */
 static void draw_body(dice *d, const umb_ray_frame *f, umb_ray_point *p)
 {
-    double far = between(d, 0, 1), size[3], middle[3] = {f->hu + 1.0 + 400.0 * far * far * far, 0, between(d, -30, 30)};
+    double far = dice_between(d, 0, 1), size[3], middle[3] = {f->hu + 1.0 + 400.0 * far * far * far, 0, dice_between(d, -30, 30)};
     for (int k = 0; k < 3; ++k) {
-        size[k] = between(d, 0.1, 12) * (dice_roll(d, 4) == 0 ? 1e-4 : 1.0);
+        size[k] = dice_between(d, 0.1, 12) * (dice_roll(d, 4) == 0 ? 1e-4 : 1.0);
     }
     middle[0] += size[0];
-    middle[1] = between(d, -0.9, 0.9) * middle[0];
+    middle[1] = dice_between(d, -0.9, 0.9) * middle[0];
     for (int i = 0; i < CORNERS; ++i) {
-        p[i] = (umb_ray_point){middle[0] + size[0] * between(d, -1, 1), middle[1] + size[1] * between(d, -1, 1),
-                               middle[2] + size[2] * between(d, -1, 1)};
+        p[i] = (umb_ray_point){middle[0] + size[0] * dice_between(d, -1, 1), middle[1] + size[1] * dice_between(d, -1, 1),
+                               middle[2] + size[2] * dice_between(d, -1, 1)};
     }
 }
 
@@ -46,7 +42,7 @@ static umb_ray_point draw_point(dice *d, const umb_ray_point *p)
     umb_ray_point x = p[dice_roll(d, CORNERS)];
     for (uint32_t n = dice_roll(d, 4); n > 0; --n) {
         const umb_ray_point *to = &p[dice_roll(d, CORNERS)];
-        double part = between(d, 0, 1);
+        double part = dice_between(d, 0, 1);
         x = (umb_ray_point){x.u + part * (to->u - x.u), x.v + part * (to->v - x.v), x.z + part * (to->z - x.z)};
     }
     return x;
@@ -94,7 +90,7 @@ static void check_points(const umb_ray_tilt *a, const umb_umbra_query *q, dice *
     }
     for (int n = 0; n < 400; ++n) {
         umb_ray_point p = draw_point(d, a->shape->points);
-        double s = a->s + UMB_TILE * m->ds * between(d, 0, 1);
+        double s = a->s + UMB_TILE * m->ds * dice_between(d, 0, 1);
         double t = (p.v - (m->alpha0 + m->alpha1 * p.u) * s) / (m->beta0 + m->beta1 * p.u);
         double column = floor((t - a->t) / m->dt);
         uint32_t r = (uint32_t)fmin(UMB_TILE - 1, (s - a->s) / m->ds);
@@ -127,7 +123,7 @@ static void check_body(const umb_ray_map *m, dice *d, tally *sum)
     uint32_t i, j;
     draw_body(d, m->frame, p);
     if (!umb_ray_shape_measure(m->frame, p, CORNERS, &shape) || !umb_ray_shape_outline(m->frame, p, CORNERS, false, &shape) ||
-        !tile_at(m, p, m->s0 + between(d, 0, 1) * m->rows * UMB_TILE * m->ds, &i, &j)) {
+        !tile_at(m, p, m->s0 + dice_between(d, 0, 1) * m->rows * UMB_TILE * m->ds, &i, &j)) {
         return;
     }
     for (int r = 0; r < UMB_TILE; ++r) {

@@ -71,7 +71,7 @@ typedef struct umb_umbra_draw {
 typedef struct umb_umbra_query {
     float from[UMB_TILE], to[UMB_TILE];
     float top, bottom, depth; /* upper bound of m, lower bound of M, lower bound of u */
-    bool tilted;                 /* then the first two are here, for each pixel of the rows */
+    bool tilted; /* then bounds like the first two are here, for each pixel of the rows */
     float tops[64], bottoms[64];
 } umb_umbra_query;
 
