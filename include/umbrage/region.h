@@ -20,7 +20,7 @@ typedef struct umb_region umb_region;
 
 typedef struct umb_region_def {
     umb_isa isa;      /* AUTO by default; answers do not depend on it */
-    umb_tasks tasks;  /* for the refinement; answers do not depend on it */
+    umb_tasks tasks;  /* for looks at bodies and the refinement; answers do not depend on it */
     umb_error *error; /* text of failures; may be NULL; must outlive the engine */
 } umb_region_def;
 
@@ -47,6 +47,9 @@ typedef struct umb_region_query {
     /* Only occluders that reach down to the lowest point of scene and cell, of which only the top is kept (the
        thesis's half-umbra). Faster; hides less where things float, stand on pillars or hang. Needs a vertical. */
     bool half_umbra;
+    /* Answer from the occlusion maps alone, as the thesis does: no look at single bodies after them. Larger sets, half the time
+       of small cells. */
+    bool maps_only;
     /* Sight-lines may start this far ahead of the eye: occluders within four times that distance of the cell are
        ignored. Then the set is right for views from within the cell whose near depth is at most near_depth and
        whose picture's corners are at most 75 degrees off the axis. 0: sight-lines start at the eye. */
@@ -56,6 +59,8 @@ typedef struct umb_region_query {
 typedef struct umb_region_stats {
     uint32_t objects;           /* live objects of the scene */
     uint64_t triangles;         /* theirs, of all kinds */
+    uint32_t mapped;            /* objects that the occlusion maps left; pvs is what bodies left of them */
+    uint64_t mapped_triangles;  /* theirs */
     uint64_t pvs_triangles;     /* of the objects in pvs */
     uint64_t refined_triangles; /* of the objects in refined */
     uint32_t nodes;             /* nodes of the index opened */
@@ -67,7 +72,7 @@ typedef struct umb_region_stats {
 
 /* The answer. Borrowed: valid until the engine's next umb_region_solve. Ids ascend. */
 typedef struct umb_region_answer {
-    const uint32_t *pvs; /* from the occlusion maps alone */
+    const uint32_t *pvs; /* from the occlusion maps, and what single bodies hide */
     uint32_t pvs_count;
     const uint32_t *refined; /* a subset of pvs, NULL before umb_region_refine */
     uint32_t refined_count;
@@ -81,7 +86,9 @@ UMB_API umb_result umb_region_create(umb_index *index, const umb_region_def *def
 /* NULL is allowed. */
 UMB_API void umb_region_destroy(umb_region *region);
 
-/* The potentially visible set of one cell, from the occlusion maps. Safe direction: may report hidden objects;
+/* The potentially visible set of one cell: from the occlusion maps, then each object that they leave is held against single
+ * bodies, which are exact however far away they are (docs/conservative.md, T5). Bodies of occluders are found when a cell first uses
+ * them and kept for the next cell of the same version of the scene. Safe direction: may report hidden objects;
  * never leaves out one of which a point can be seen from a point of the cell, provided every object's bounds
  * contain what is drawn for it. Objects that touch the cell are always in. Cost: proportional to what is in the
  * answer. Errors: UMB_ERROR_ARGUMENT for cells that are inverted, not finite or farther out than 1e15 and for numbers out
@@ -90,7 +97,8 @@ UMB_API umb_result umb_region_solve(umb_region *region, const umb_region_query *
 
 /* Look again at what the last umb_region_solve left, object by object, in all directions alike: objects that are
  * proved hidden go, by solids that each block a part of the cell from a part of the object (thesis 3.1 names the
- * loss that this takes back). effort: how many parts a single object, and again its triangles if it
+ * loss that this takes back). A cell wider than objects are is cut into parts, sixteen at most, which are solved one by one for what
+ * is undecided then: what is hidden from all parts is hidden from the cell. effort: how many parts a single object, and again its triangles if it
  * is not a box, may be cut into before it stays in; 0: 512.
  * Safe direction: as above. *out is the whole answer again. Errors: UMB_ERROR_STATE without a solve before it,
  * no memory. */

@@ -1,13 +1,17 @@
 #include "beam.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #define LEAST_PART 0x1p-19
 #define TRIALS 96
+/* What a cut is worth: segments that it parts, a half that needs no further cut, how long what is cut is. These left the fewest
+ * objects undecided in cities and box fields. */
+#define WHOLE 64
+#define HALVED 16
 
-/* Of a triangle each corner several times. */
-static void corners_of(const umb_beam_part *p, double out[8][3])
+void umb_beam_corners(const umb_beam_part *p, double out[8][3])
 {
     for (int c = 0; c < 8 && p->triangle; ++c) {
         memcpy(out[c], c % 3 == 0 ? p->middle : p->axes[c % 3 - 1], sizeof out[c]);
@@ -37,16 +41,6 @@ static double axis_squared(const umb_beam_part *p, int a)
     const double *from = a == 0 ? p->middle : p->axes[a - 1], *to = a == 2 ? p->middle : p->axes[a];
     double half[3] = {0.5 * (to[0] - from[0]), 0.5 * (to[1] - from[1]), 0.5 * (to[2] - from[2])};
     return length_squared(half);
-}
-
-static int longest_axis(const umb_beam_part *p, double *length)
-{
-    int longest = 0;
-    for (int a = 1; a < 3; ++a) {
-        longest = axis_squared(p, a) > axis_squared(p, longest) ? a : longest;
-    }
-    *length = axis_squared(p, longest);
-    return longest;
 }
 
 /* Half of a part along an axis; halves of boxes overlap by far more than rounding can part them. */
@@ -79,7 +73,7 @@ static void box_of(const double corners[8][3], double min[3], double max[3])
 void umb_beam_bounds(const umb_beam_part *p, double min[3], double max[3])
 {
     double corners[8][3];
-    corners_of(p, corners);
+    umb_beam_corners(p, corners);
     box_of((const double(*)[3])corners, min, max);
 }
 
@@ -118,8 +112,8 @@ static bool blocks_segment(const looked_at *l, const uint32_t *bodies, uint32_t 
 }
 
 /* One segment after another: who blocks it is asked about the others too. Most of what can be seen shows in the first
- * few. What blocks most comes first then. */
-static verdict look(looked_at *l, uint32_t *bodies, uint32_t count)
+ * few. SHARED: what blocks most comes first, and *most of them. */
+static verdict look(looked_at *l, uint32_t *bodies, uint32_t count, uint64_t *most)
 {
     uint64_t blocked = 0;
     uint32_t best = 0, weight = 0;
@@ -155,6 +149,7 @@ static verdict look(looked_at *l, uint32_t *bodies, uint32_t count)
         }
     }
     uint32_t first = bodies[0];
+    *most = l->own[best];
     bodies[0] = bodies[best];
     bodies[best] = first;
     return SHARED;
@@ -162,13 +157,13 @@ static verdict look(looked_at *l, uint32_t *bodies, uint32_t count)
 
 /* Bodies that may meet a segment of the beam come first: *n of them. */
 static __attribute__((noinline)) verdict look_at(const umb_solids *solids, const umb_beam_part *a, const umb_beam_part *b,
-                                                 uint32_t *bodies, uint32_t count, uint32_t *n)
+                                                 uint32_t *bodies, uint32_t count, uint32_t *n, uint64_t *most)
 {
     looked_at l = {.solids = solids};
     double min[2][3], max[2][3];
     umb_shaft shaft;
-    corners_of(a, l.from);
-    corners_of(b, l.to);
+    umb_beam_corners(a, l.from);
+    umb_beam_corners(b, l.to);
     box_of((const double(*)[3])l.from, min[0], max[0]);
     box_of((const double(*)[3])l.to, min[1], max[1]);
     umb_shaft_make(&shaft, (const double(*)[3])min, (const double(*)[3])max);
@@ -180,7 +175,7 @@ static __attribute__((noinline)) verdict look_at(const umb_solids *solids, const
             bodies[(*n)++] = body;
         }
     }
-    return look(&l, bodies, *n);
+    return look(&l, bodies, *n, most);
 }
 
 /* A point of a part: six numbers in [-1, 1) make a segment. */
@@ -228,28 +223,69 @@ static bool trials_blocked(const umb_solids *solids, const umb_beam_part *a, con
     return true;
 }
 
+/* Where a beam is cut: one of the axes of both parts. */
+typedef struct place {
+    bool target;
+    int axis;
+} place;
+
+/* Segments of the 64 whose end in a part has the axis's other end: bit `axis` of a box's corner; corner `axis` of a triangle, and the
+ * one after it. */
+static uint64_t segments_at(const umb_beam_part *p, bool target, int axis, bool upper)
+{
+    uint64_t mask = 0;
+    for (int c = 0; c < 8; ++c) {
+        bool here = p->triangle ? c % 3 == (axis + (upper ? 1 : 0)) % 3 : (c >> axis & 1) == (upper ? 1 : 0);
+        mask |= !here ? 0 : target ? UINT64_C(0x0101010101010101) << c : UINT64_C(0xFF) << (8 * c);
+    }
+    return mask;
+}
+
+/* Across what best parts the segments that the body which blocks most lets by from those that it blocks, but not what is short
+ * beside others. False: all are short. */
+static bool find_place(const umb_beam_part *a, const umb_beam_part *b, uint64_t most, double least, place *out)
+{
+    int best = INT32_MIN;
+    for (int k = 0; k < 6; ++k) {
+        const umb_beam_part *p = k < 3 ? a : b;
+        double size = axis_squared(p, k % 3);
+        if (!(size > least * least)) {
+            continue;
+        }
+        int low = __builtin_popcountll(most & segments_at(p, k >= 3, k % 3, false));
+        int high = __builtin_popcountll(most & segments_at(p, k >= 3, k % 3, true));
+        int whole = low == 32 || high == 32 ? WHOLE : 0; /* one half is blocked by one body */
+        int score = abs(high - low) + whole + HALVED * ilogb(size) / 2;
+        if (score > best) {
+            best = score;
+            *out = (place){k >= 3, k % 3};
+        }
+    }
+    return best > INT32_MIN;
+}
+
 /* Whatever of the segments between corners no body meets will still be there in some part, however small: then it is no
  * use to go on. */
 static bool blocked(umb_beam_search *s, const umb_beam_part *a, const umb_beam_part *b, uint32_t *bodies, uint32_t count,
                     bool whole)
 {
     uint32_t n;
+    uint64_t most;
     if (s->effort == 0) {
         return false;
     }
     s->effort -= 1;
-    verdict v = look_at(s->solids, a, b, bodies, count, &n);
+    verdict v = look_at(s->solids, a, b, bodies, count, &n, &most);
     if (v != SHARED || (whole && !trials_blocked(s->solids, a, b, bodies, n))) {
         return v == BLOCKED;
     }
-    double la, lb, least = LEAST_PART * s->solids->reach;
-    int axis_a = longest_axis(a, &la), axis_b = longest_axis(b, &lb);
-    if (!(fmax(la, lb) > least * least)) {
+    place at;
+    if (!find_place(a, b, most, LEAST_PART * s->solids->reach, &at)) {
         return false;
     }
     for (int side = -1; side <= 1; side += 2) {
-        umb_beam_part half = la > lb ? half_of(a, axis_a, side) : half_of(b, axis_b, side);
-        if (!blocked(s, la > lb ? &half : a, la > lb ? b : &half, bodies, n, false)) {
+        umb_beam_part half = half_of(at.target ? b : a, at.axis, side);
+        if (!blocked(s, at.target ? a : &half, at.target ? &half : b, bodies, n, false)) {
             return false;
         }
     }

@@ -23,6 +23,8 @@ typedef struct umb_beam_part {
 
 umb_beam_part umb_beam_box(const double min[3], const double max[3], double more);
 umb_beam_part umb_beam_triangle(const double corners[3][3]);
+/* Eight; of a triangle each of its three several times. */
+void umb_beam_corners(const umb_beam_part *p, double out[8][3]);
 void umb_beam_bounds(const umb_beam_part *p, double min[3], double max[3]);
 
 typedef struct umb_beam_search {

@@ -47,25 +47,24 @@ static void point_of(const umb_occluder *o, uint32_t v, double out[3])
 enum { FRONT = 1, BACK = 2 };
 
 /* On which sides of a triangle's plane the cell's corners lie; both where rounding cannot tell. The bound is that of
- * solid.c. */
+ * solid.c: of the cell's middle, and as much again for how far corners are from it. */
 static int cell_sides(const umb_pieces *s, const umb_occluder *o, uint32_t triangle)
 {
     const uint32_t *t = o->mesh->triangles[triangle];
-    double p[3][3];
+    double p[3][3], x = 0.0, away = 0.0;
     for (int c = 0; c < 3; ++c) {
         point_of(o, t[c], p[c]);
     }
     umb_vec3 a = umb_vec3_from_double(p[0]);
     umb_vec3 u = umb_vec3_sub(umb_vec3_from_double(p[o->mirrored ? 2 : 1]), a);
     umb_vec3 v = umb_vec3_sub(umb_vec3_from_double(p[o->mirrored ? 1 : 2]), a);
-    umb_vec3 n = umb_vec3_cross(u, v);
-    double error = 0x1p-45 * umb_vec3_sum_abs(u) * umb_vec3_sum_abs(v) * s->reach;
-    int sides = 0;
-    for (int i = 0; i < 8; ++i) {
-        double x = umb_vec3_dot(n, umb_vec3_sub(umb_vec3_from_double(s->corners[i]), a));
-        sides |= (x > error ? FRONT : x < -error ? BACK : FRONT | BACK);
+    umb_vec3 cross = umb_vec3_cross(u, v);
+    double n[3] = {cross.x, cross.y, cross.z}, error = 0x1p-44 * umb_vec3_sum_abs(u) * umb_vec3_sum_abs(v) * s->reach;
+    for (int k = 0; k < 3; ++k) {
+        x += n[k] * (0.5 * (s->corners[0][k] + s->corners[7][k]) - p[0][k]);
+        away += fabs(n[k]) * 0.5 * (s->corners[7][k] - s->corners[0][k]);
     }
-    return sides;
+    return x - away > error ? FRONT : x + away < -error ? BACK : FRONT | BACK;
 }
 
 /* ---- convex bodies -------------------------------------------------------------------------------- */

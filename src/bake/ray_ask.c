@@ -10,7 +10,7 @@
  * named, so 2^-44 of that is hundreds of times what rounding can do. */
 #define SLACK 0x1p-44
 /* What is so thin for its distance has one range of u for all lines. */
-#define THIN 0x1p-6
+#define THIN 0x1p-5
 
 /* Cut an outline to u >= least. */
 static uint32_t cut(const umb_ray_point *p, uint32_t count, double least, umb_ray_point *out)
@@ -178,11 +178,11 @@ static bool bounds_of(const umb_ray_frame *f, const umb_ray_shape *shape, double
     double up = shape->z1 - f->z1, rise = shape->z0 - f->z0;
     double top = up >= 0.0 ? up / (u_min - ua_max) : up / (u_max - ub_min);
     double bottom = rise >= 0.0 ? rise / (u_max - ub_min) : rise / (u_min - ua_max);
-    q->top = nextafterf((float)(top + SLACK * fabs(top)), INFINITY);
-    q->bottom = nextafterf((float)(bottom - SLACK * fabs(bottom)), -INFINITY);
+    q->top = umb_float_above((float)(top + SLACK * fabs(top)));
+    q->bottom = umb_float_below((float)(bottom - SLACK * fabs(bottom)));
     q->top = q->top < f->steep ? q->top : f->steep; /* no ray is steeper */
     q->bottom = q->bottom > -f->steep ? q->bottom : -f->steep;
-    q->depth = nextafterf((float)u_min, -INFINITY);
+    q->depth = umb_float_below((float)u_min);
     q->tilted = false;
     return true;
 }
@@ -282,6 +282,14 @@ static bool range_over(const asked *q, const beam *b, double *u_min, double *u_m
     return range_of_u(q->map, q->shape, b, u_min, u_max);
 }
 
+/* The summary holds all that lines may meet of the shape anywhere: what most of what is hidden needs no more than. */
+static bool holds_anywhere(const asked *a, const umb_umbra_summary *s, const float span[3])
+{
+    const umb_ray_frame *f = a->map->frame;
+    umb_umbra_query q;
+    return bounds_of(f, a->shape, a->shape->u_min - f->error, a->shape->u_max + f->error, span[0], span[1], span[2], &q) && holds(s, &q);
+}
+
 /* The pixels of a tile that lines to the shape may go through. */
 static uint64_t touched_pixels(const asked *a, uint32_t i, uint32_t j, umb_umbra_query *q)
 {
@@ -310,6 +318,9 @@ static bool tile_hides(const asked *a, uint32_t i, uint32_t j)
     umb_umbra_query q;
     double u_min, u_max;
     const float *span = m->spans[i * (m->columns / UMB_TILE) + j / UMB_TILE];
+    if (m->drawn[tile] && !a->thin && holds_anywhere(a, &m->summaries[tile], (const float[3]){span[0], span[1], span[1]})) {
+        return true;
+    }
     beam b = rectangle(m, i, j, 1, 1);
     if (!range_over(a, &b, &u_min, &u_max)) {
         return true;
@@ -333,20 +344,22 @@ static bool tile_hides(const asked *a, uint32_t i, uint32_t j)
     return umb_ray_tilt_bound(&tilt, a->kernels, &q) && a->kernels->open(intervals, m->umbrae, &q) == 0;
 }
 
-static bool group_holds(const asked *a, uint32_t gi, uint32_t gj, bool *touched)
+static bool group_holds(const asked *a, uint32_t gi, uint32_t gj)
 {
     umb_ray_map *m = a->map;
     uint32_t group = gi * (m->columns / UMB_TILE) + gj;
     double u_min, u_max;
     beam b = rectangle(m, gi * m->group_rows, gj * UMB_TILE, m->group_rows, UMB_TILE);
-    *touched = range_over(a, &b, &u_min, &u_max);
-    if (!*touched) {
-        return true;
-    }
+    const float *span = m->group_spans[group];
     if (m->stale[group]) {
         sum_up_group(m, gi, gj);
     }
-    const float *span = m->group_spans[group];
+    if (!a->thin && holds_anywhere(a, &m->groups[group], span)) {
+        return true;
+    }
+    if (!range_over(a, &b, &u_min, &u_max)) {
+        return true;
+    }
     umb_umbra_query q;
     return bounds_of(m->frame, a->shape, u_min, u_max, span[0], span[1], span[2], &q) && holds(&m->groups[group], &q);
 }
@@ -354,8 +367,7 @@ static bool group_holds(const asked *a, uint32_t gi, uint32_t gj, bool *touched)
 static bool group_hides(const asked *a, uint32_t gi, uint32_t gj, uint32_t *tile)
 {
     const umb_ray_map *m = a->map;
-    bool touched;
-    if (group_holds(a, gi, gj, &touched)) {
+    if (group_holds(a, gi, gj)) {
         return true;
     }
     for (uint32_t i = gi * m->group_rows; i < (gi + 1) * m->group_rows; ++i) {

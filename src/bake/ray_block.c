@@ -29,7 +29,7 @@ void umb_ray_bound_vertex(const umb_ray_map *m, const umb_ray_point *p, float ua
 {
     double e = m->frame->error, up = p->z - m->frame->z1, rise = p->z - m->frame->z0;
     double a = p->u - ua, b = p->u - ub;
-    v->depth = nextafterf((float)(p->u + e), INFINITY);
+    v->depth = umb_float_above((float)(p->u + e));
     v->margin = (float)(b - 16.0 * error_u);
     if (!(v->margin > 0.0f)) {
         v->top = v->top_far = -INFINITY;
@@ -39,14 +39,14 @@ void umb_ray_bound_vertex(const umb_ray_map *m, const umb_ray_point *p, float ua
     double qa1 = up > e ? (up - e) / (a + e) : (up - e) / (a - e), qb1 = up > e ? (up - e) / (b + e) : (up - e) / (b - e);
     double qa0 = rise > e ? (rise - e) / (a + e) : (rise - e) / (a - e);
     double qb0 = rise > e ? (rise - e) / (b + e) : (rise - e) / (b - e);
-    v->top = nextafterf((float)umb_least(qa1, qb1), -INFINITY);
-    v->top_far = nextafterf((float)umb_least(qa0, qb0), -INFINITY);
+    v->top = umb_float_below((float)umb_least(qa1, qb1));
+    v->top_far = umb_float_below((float)umb_least(qa0, qb0));
     qa1 = up < -e ? (up + e) / (a + e) : (up + e) / (a - e);
     qb1 = up < -e ? (up + e) / (b + e) : (up + e) / (b - e);
     qa0 = rise < -e ? (rise + e) / (a + e) : (rise + e) / (a - e);
     qb0 = rise < -e ? (rise + e) / (b + e) : (rise + e) / (b - e);
-    v->bottom = nextafterf((float)umb_most(qa0, qb0), INFINITY);
-    v->bottom_far = nextafterf((float)umb_most(qa1, qb1), INFINITY);
+    v->bottom = umb_float_above((float)umb_most(qa0, qb0));
+    v->bottom_far = umb_float_above((float)umb_most(qa1, qb1));
 }
 
 static uint8_t use_vertex(band *d, uint32_t i, uint32_t column, uint32_t columns)

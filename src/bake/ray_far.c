@@ -28,7 +28,7 @@ static void bounds_over(const umb_ray_map *m, const umb_ray_blocker *b, const um
                         umb_umbra_strip *s, double *loss)
 {
     const umb_ray_frame *f = m->frame;
-    float ua = nextafterf((float)-f->hu, -INFINITY), ub = nextafterf((float)f->hu, INFINITY);
+    float ua = umb_float_below((float)-f->hu), ub = umb_float_above((float)f->hu);
     float top_most = -INFINITY, bottom_least = INFINITY;
     *s = (umb_umbra_strip){.top = INFINITY, .top_far = INFINITY, .bottom_far = -INFINITY, .bottom = -INFINITY};
     umb_umbra_vertex x;
@@ -48,7 +48,7 @@ static void bounds_over(const umb_ray_map *m, const umb_ray_blocker *b, const um
     for (uint32_t i = 0; i < b->count; ++i) {
         deepest = umb_most(deepest, b->vertices[i].u);
     }
-    s->depth = nextafterf((float)(deepest + f->error), INFINITY);
+    s->depth = umb_float_above((float)(deepest + f->error));
     s->steep = f->steep;
     *loss = umb_most((double)top_most - s->top, floor ? 0.0 : (double)s->bottom - bottom_least);
 }

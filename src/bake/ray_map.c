@@ -91,8 +91,8 @@ static void find_span(const umb_ray_map *m, uint32_t row, uint32_t group, float 
     bool whole = (rises && falls) || !(ua < ub);
     ua = whole ? -f->hu : fmax(-f->hu, ua - 0x1p-20 * f->hu);
     ub = whole ? f->hu : fmin(f->hu, ub + 0x1p-20 * f->hu);
-    span[0] = nextafterf((float)ua, -INFINITY);
-    span[1] = nextafterf((float)ub, INFINITY);
+    span[0] = umb_float_below((float)ua);
+    span[1] = umb_float_above((float)ub);
 }
 
 /* Over the rows of a group: the largest ua, the least and the largest ub. */

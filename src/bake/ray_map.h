@@ -8,6 +8,9 @@
 #ifndef UMB_RAY_MAP_H
 #define UMB_RAY_MAP_H
 
+#include <math.h>
+#include <string.h>
+
 #include "base/memory.h"
 #include "umbra_kernels.h"
 
@@ -20,6 +23,22 @@ static inline double umb_least(double a, double b)
 static inline double umb_most(double a, double b)
 {
     return a > b ? a : b;
+}
+
+/* The next float, as nextafterf() has it, which is a call. */
+static inline float umb_float_above(float x)
+{
+    int32_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    bits = x > 0.0f ? bits + 1 : x < 0.0f ? bits - 1 : 1;
+    float next;
+    memcpy(&next, &bits, sizeof next);
+    return x < INFINITY ? next : x;
+}
+
+static inline float umb_float_below(float x)
+{
+    return -umb_float_above(-x);
 }
 
 /* A view cell as a frame sees it. */

@@ -7,6 +7,8 @@
 #include "base/isa.h"
 #include "region_state.h"
 
+#define DEFAULT_EFFORT 512
+
 umb_result umb_region_fail(const umb_region *region, umb_result code, const char *format, ...)
 {
     if (region->error != NULL) {
@@ -40,7 +42,7 @@ umb_result umb_region_create(umb_index *index, const umb_region_def *def, umb_re
     region->error = def->error;
     region->kernels = umb_umbra_kernels_get(isa);
     region->pieces.allocator = &region->allocator;
-    region->solids.allocator = &region->allocator;
+    region->found.allocator = &region->allocator;
     *out = region;
     return UMB_OK;
 }
@@ -51,8 +53,10 @@ void umb_region_destroy(umb_region *region)
         return;
     }
     umb_allocator a = region->allocator;
+    umb_region_destroy(region->part);
     umb_solid_tree_free(&region->solid_tree, &a);
-    umb_solids_free(&region->solids);
+    umb_solids_free(&region->found);
+    umb_memory_free(&a, region->solids.items, region->solids.capacity * sizeof *region->solids.items);
     umb_pieces_free(&region->pieces);
     for (int i = 0; i < UMB_REGION_MAPS; ++i) {
         umb_ray_map_free(&region->maps[i], &a);
@@ -62,6 +66,7 @@ void umb_region_destroy(umb_region *region)
     umb_memory_free(&a, region->queue, region->queue_capacity * sizeof *region->queue);
     umb_memory_free(&a, region->pvs, region->pvs_capacity * sizeof *region->pvs);
     umb_memory_free(&a, region->refined, region->refined_capacity * sizeof *region->refined);
+    umb_memory_free(&a, region->verdicts, region->verdict_capacity);
     umb_memory_free(&a, region, sizeof *region);
 }
 
@@ -188,6 +193,8 @@ static umb_result prepare(umb_region *region, const umb_region_query *query)
                             (size_t)tree->object_count + 1, sizeof *region->pvs) ||
         !umb_memory_reserve(&region->allocator, (void **)&region->refined, &region->refined_capacity,
                             (size_t)c->object_count + 1, sizeof *region->refined) ||
+        !umb_memory_reserve(&region->allocator, (void **)&region->verdicts, &region->verdict_capacity,
+                            (size_t)tree->object_count + 1, 1) ||
         !umb_memory_reserve(&region->allocator, (void **)&region->known, &region->known_capacity,
                             (size_t)c->occluder_count + 1, 1)) {
         return UMB_ERROR_MEMORY;
@@ -202,8 +209,6 @@ static umb_result prepare(umb_region *region, const umb_region_query *query)
     region->pieces.known = region->known;
     region->reach = largest(query, tree);
     set_cell(region, query);
-    region->solids.count = region->solids.plane_count = 0;
-    region->solids.reach = region->reach;
     return UMB_OK;
 }
 
@@ -225,6 +230,12 @@ umb_result umb_region_solve(umb_region *region, const umb_region_query *query, u
     umb_region_answer *a = &region->answer;
     qsort(region->pvs, a->pvs_count, sizeof *region->pvs, by_id);
     a->pvs_count = once_each(region->pvs, a->pvs_count);
+    a->stats.mapped = a->pvs_count;
+    a->stats.mapped_triangles = sum_triangles(c, region->pvs, a->pvs_count);
+    memset(region->verdicts, UMB_LEFT, a->pvs_count);
+    if (!query->maps_only && umb_region_look(region) != UMB_OK) {
+        return umb_region_fail(region, UMB_ERROR_MEMORY, "no memory for a view cell");
+    }
     a->pvs = region->pvs;
     a->stats.pvs_triangles = sum_triangles(c, a->pvs, a->pvs_count);
     region->solved = true;
@@ -239,8 +250,16 @@ umb_result umb_region_refine(umb_region *region, uint32_t effort, umb_region_ans
         return umb_region_fail(region, UMB_ERROR_STATE, "there is no solved cell to refine");
     }
     umb_region_answer *a = &region->answer;
-    if (umb_region_decide(region, effort) != UMB_OK) {
+    if ((region->query.maps_only && umb_region_find_bodies(region) != UMB_OK) ||
+        umb_region_decide_parts(region, effort != 0 ? effort : DEFAULT_EFFORT) != UMB_OK) {
         return umb_region_fail(region, UMB_ERROR_MEMORY, "no memory to refine %u objects", a->pvs_count);
+    }
+    a->refined_count = a->stats.undecided = 0;
+    for (uint32_t i = 0; i < a->pvs_count; ++i) {
+        if (region->verdicts[i] != UMB_HIDDEN) {
+            region->refined[a->refined_count++] = a->pvs[i];
+        }
+        a->stats.undecided += region->verdicts[i] == UMB_UNDECIDED ? 1 : 0;
     }
     a->refined = region->refined;
     a->stats.refined_triangles = sum_triangles(umb_scene_committed(umb_index_scene(region->index)), a->refined,

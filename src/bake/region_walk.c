@@ -8,7 +8,7 @@
 /* ---- the queue: a heap of keys, each with what it is for ---------------------------------------- */
 
 /* What is waiting; at equal distances in this order, then by number. */
-typedef enum turn { NODE, OCCLUDER, OBJECT, DRAWING, LEAVING } turn;
+typedef enum turn { NODE, OCCLUDER, OBJECT, DRAWING, LEAVING, TAKING } turn;
 
 /* Bits of what is waiting for, and of a distance, which is not negative: it has no use for a sign. */
 #define TURN_BITS 3
@@ -355,6 +355,8 @@ static umb_result block(umb_region *r, const umb_occluder *o)
 
 /* ---- the walk ------------------------------------------------------------------------------------ */
 
+#define SHORT (1.0f / 8.0f) /* for a distance */
+
 /* How far a box is from the cell, along the farthest of the axes that rays are sorted by. */
 static float gap_of(const umb_region *r, const umb_aabb *b)
 {
@@ -399,17 +401,24 @@ static umb_aabb node_box(const umb_node *n)
     return box;
 }
 
-/* When the walk has come to the far side of a box. An occluder is drawn then: what is asked about before that lies beside it
- * or in front of it, and would find intervals joined with it to begin too far away. An object that was seen is asked about
- * once more then, for what lies in front of it has been drawn by then. */
-static umb_result later(umb_region *r, const umb_aabb *b, turn what, uint32_t number)
+/* How far a box's far side is from the cell. */
+static float far_of(const umb_region *r, const umb_aabb *b)
 {
     double far = 0.0;
     for (uint32_t i = 0; i < r->frame_count; i += 2) {
         uint32_t k = r->frames[i].axis_u;
         far = umb_most(far, umb_most(r->query.min[k] - b->min[k], b->max[k] - r->query.max[k]));
     }
-    return push(r, order_of((float)far, what, number));
+    return (float)far;
+}
+
+/* When the walk has come to the far side of what was not hidden. An occluder is drawn then: what is asked about before that lies
+ * beside it or in front of it, and would find intervals joined with it to begin too far away. An object is asked about once more
+ * then, for what lies in front of it has been drawn by then: little has, if it is short for its distance, and it is taken. */
+static umb_result later(umb_region *r, const umb_aabb *b, turn what, uint32_t number)
+{
+    float near = gap_of(r, b), far = far_of(r, b);
+    return push(r, order_of(far, what == LEAVING && far - near <= SHORT * near ? TAKING : what, number));
 }
 
 static umb_result visit(umb_region *r, const umb_tree *tree, const umb_committed *c, uint64_t order)
@@ -430,7 +439,7 @@ static umb_result visit(umb_region *r, const umb_tree *tree, const umb_committed
         return box_hidden(r, &o->bounds, &open) ? UMB_OK : later(r, &o->bounds, DRAWING, number);
     }
     const umb_object *o = &c->objects[number];
-    if (object_hidden(r, o)) {
+    if (what != TAKING && object_hidden(r, o)) {
         return UMB_OK;
     }
     if (what == OBJECT) {
@@ -445,7 +454,8 @@ static void leave_all(umb_region *r, const umb_committed *c)
 {
     for (size_t i = 0; i < r->queue_count; ++i) {
         uint32_t number = (uint32_t)r->queue[i] & UMB_REF_NUMBER;
-        if (turn_of(r->queue[i]) == LEAVING && !object_hidden(r, &c->objects[number])) {
+        turn what = turn_of(r->queue[i]);
+        if (what == TAKING || (what == LEAVING && !object_hidden(r, &c->objects[number]))) {
             r->pvs[r->answer.pvs_count++] = number;
         }
     }

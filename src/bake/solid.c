@@ -4,14 +4,46 @@
 
 #include "geometry/orient.h"
 #include "geometry/transform.h"
+#include "solid_inner.h"
 
 void umb_solids_free(umb_solids *s)
 {
     if (s->allocator != NULL) {
         umb_memory_free(s->allocator, s->items, s->capacity * sizeof *s->items);
         umb_memory_free(s->allocator, s->planes, s->plane_capacity * sizeof *s->planes);
+        umb_memory_free(s->allocator, s->runs, s->run_capacity * sizeof *s->runs);
     }
     memset(s, 0, sizeof *s);
+}
+
+bool umb_solids_begin(umb_solids *s, uint32_t occluder_count, double reach)
+{
+    if (!umb_memory_reserve(s->allocator, (void **)&s->runs, &s->run_capacity, (size_t)occluder_count + 1, sizeof *s->runs)) {
+        return false;
+    }
+    memset(s->runs, 0xFF, s->run_capacity * sizeof *s->runs);
+    s->count = s->plane_count = 0;
+    s->reach = reach;
+    return true;
+}
+
+umb_result umb_solids_find(umb_solids *s, const umb_occluder *o, uint32_t number)
+{
+    uint32_t first = (uint32_t)s->count;
+    bool added;
+    if (s->runs[number].first != UMB_NONE) {
+        return UMB_OK;
+    }
+    umb_result result = umb_solids_add(s, o, number, &added);
+    if (result == UMB_OK && !added) {
+        result = umb_solids_add_inner(s, o, number);
+    }
+    if (result == UMB_OK) {
+        s->runs[number] = (struct umb_solid_run){first, (uint32_t)s->count - first};
+    } else {
+        s->count = first;
+    }
+    return result;
 }
 
 void umb_box_corners(const double min[3], const double max[3], double out[8][3])
@@ -38,6 +70,8 @@ void umb_solid_vertices(const umb_occluder *o, double out[][3])
     }
 }
 
+#define PLANES 32 /* of a body whose values are kept at hand */
+
 static double value(const double plane[4], const double p[3])
 {
     return plane[0] * p[0] + plane[1] * p[1] + plane[2] * p[2] + plane[3];
@@ -62,20 +96,15 @@ static void make_plane(const double p[][3], const uint32_t t[3], bool mirrored, 
     plane[3] = -umb_vec3_dot(n, a) + *error;
 }
 
-/* True if all corners of the box lie surely farther out along the plane's normal than all vertices do. */
-static bool separates(const double plane[4], double error, const double p[][3], uint32_t count,
-                      const double box[8][3])
+/* What is larger than the value of any vertex, whatever rounding does. */
+static double beyond_all(const double plane[4], double error, const double p[][3], uint32_t count)
 {
-    double most = value(plane, p[0]), least = value(plane, box[0]);
+    double most = value(plane, p[0]);
     for (uint32_t i = 1; i < count; ++i) {
         double x = value(plane, p[i]);
         most = x > most ? x : most;
     }
-    for (int i = 1; i < 8; ++i) {
-        double x = value(plane, box[i]);
-        least = x < least ? x : least;
-    }
-    return least > most + 2.0 * error;
+    return most + 2.0 * error;
 }
 
 static bool boxes_apart(const umb_aabb *a, const double box[8][3])
@@ -86,6 +115,29 @@ static bool boxes_apart(const umb_aabb *a, const double box[8][3])
         }
     }
     return false;
+}
+
+static bool all_beyond(const umb_solid_plane *p, const double box[8][3])
+{
+    for (int i = 0; i < 8; ++i) {
+        if (!(value(p->plane, box[i]) > p->beyond)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+bool umb_solids_apart(const umb_solids *s, const umb_occluder *o, uint32_t number, const double box[8][3])
+{
+    struct umb_solid_run run = s->runs[number];
+    bool apart = boxes_apart(&o->bounds, box);
+    for (uint32_t i = run.first; i < run.first + run.count && !apart; ++i) {
+        const umb_solid *body = &s->items[i];
+        for (uint32_t k = 0; k < body->plane_count && !apart; ++k) {
+            apart = all_beyond(&s->planes[body->first_plane + k], box);
+        }
+    }
+    return apart;
 }
 
 /* A triangle in exactly the plane of one before it adds nothing. */
@@ -112,8 +164,7 @@ static bool plane_before(const umb_mesh *m, const double p[][3], uint32_t triang
     return false;
 }
 
-umb_result umb_solids_add(umb_solids *s, const umb_occluder *o, uint32_t number, const double box[8][3],
-                          bool *added)
+umb_result umb_solids_add(umb_solids *s, const umb_occluder *o, uint32_t number, bool *added)
 {
     const umb_mesh *m = o->mesh;
     *added = false;
@@ -133,18 +184,19 @@ umb_result umb_solids_add(umb_solids *s, const umb_occluder *o, uint32_t number,
             inner[k] += p[i][k] / m->block_position_count;
         }
     }
-    bool apart = boxes_apart(&o->bounds, box), solid = true;
+    bool solid = true;
     uint32_t planes = 0;
     for (uint32_t t = 0; t < m->triangle_count; ++t) {
         if (plane_before(m, (const double(*)[3])p, t)) {
             continue;
         }
-        double error, *plane = s->planes[first + planes++];
-        make_plane((const double(*)[3])p, m->triangles[t], o->mirrored, s->reach, plane, &error);
-        solid = solid && value(plane, inner) < 0.0;
-        apart = apart || separates(plane, error, (const double(*)[3])p, m->block_position_count, box);
+        umb_solid_plane *plane = &s->planes[first + planes++];
+        double error;
+        make_plane((const double(*)[3])p, m->triangles[t], o->mirrored, s->reach, plane->plane, &error);
+        solid = solid && value(plane->plane, inner) < 0.0;
+        plane->beyond = beyond_all(plane->plane, error, (const double(*)[3])p, m->block_position_count);
     }
-    if (!apart || !solid) {
+    if (!solid) {
         return UMB_OK;
     }
     umb_solid *body = &s->items[s->count++];
@@ -183,7 +235,7 @@ static void cut_all(double *bound, bool enters, double va, const double vb[8])
 
 uint64_t umb_solid_blocks(const umb_solids *s, const umb_solid *body, const double a[8][3], const double b[8][3])
 {
-    const double(*planes)[4] = (const double(*)[4])s->planes + body->first_plane;
+    const umb_solid_plane *planes = s->planes + body->first_plane;
     stretch stretches[8];
     for (int i = 0; i < 8; ++i) {
         for (int j = 0; j < 8; ++j) {
@@ -195,8 +247,8 @@ uint64_t umb_solid_blocks(const umb_solids *s, const umb_solid *body, const doub
         double va[8], vb[8];
         uint32_t a_out = 0, b_out = 0;
         for (int i = 0; i < 8; ++i) {
-            va[i] = value(planes[k], a[i]);
-            vb[i] = value(planes[k], b[i]);
+            va[i] = value(planes[k].plane, a[i]);
+            vb[i] = value(planes[k].plane, b[i]);
             a_out += va[i] > 0.0 ? 1 : 0;
             b_out += vb[i] > 0.0 ? 1 : 0;
         }
@@ -222,12 +274,52 @@ uint64_t umb_solid_blocks(const umb_solids *s, const umb_solid *body, const doub
     return blocked;
 }
 
+/* Those from one point; vb: values of the planes at the eight others. */
+static bool all_meet(const umb_solid_plane *planes, uint32_t count, const double a[3], const double (*vb)[8])
+{
+    stretch s;
+    for (int j = 0; j < 8; ++j) {
+        s.from[j] = 0.0;
+        s.to[j] = 1.0;
+    }
+    for (uint32_t k = 0; k < count; ++k) {
+        double va = value(planes[k].plane, a);
+        cut(&s, va, vb[k]);
+    }
+    bool all = true;
+    for (int j = 0; j < 8; ++j) {
+        all = all && s.from[j] + 0x1p-48 <= s.to[j];
+    }
+    return all;
+}
+
+bool umb_solid_blocks_all(const umb_solids *s, const umb_solid *body, const double (*a)[3], const double (*b)[3])
+{
+    const umb_solid_plane *planes = s->planes + body->first_plane;
+    double vb[PLANES][8];
+    uint32_t count = body->plane_count;
+    if (count > PLANES) {
+        return umb_solid_blocks(s, body, a, b) == UINT64_MAX;
+    }
+    for (uint32_t k = 0; k < count; ++k) {
+        for (int j = 0; j < 8; ++j) {
+            vb[k][j] = value(planes[k].plane, b[j]);
+        }
+    }
+    for (int i = 0; i < 8; ++i) {
+        if (!all_meet(planes, count, a[i * 3 & 7], (const double(*)[8])vb)) { /* corners far apart first */
+            return false;
+        }
+    }
+    return true;
+}
+
 bool umb_solid_meets(const umb_solids *s, const umb_solid *body, const double a[3], const double b[3])
 {
-    const double(*planes)[4] = (const double(*)[4])s->planes + body->first_plane;
+    const umb_solid_plane *planes = s->planes + body->first_plane;
     double from = 0.0, to = 1.0;
     for (uint32_t k = 0; k < body->plane_count; ++k) {
-        double va = value(planes[k], a), vb = value(planes[k], b);
+        double va = value(planes[k].plane, a), vb = value(planes[k].plane, b);
         if (va <= 0.0 && vb <= 0.0) {
             continue;
         }
@@ -237,6 +329,9 @@ bool umb_solid_meets(const umb_solids *s, const umb_solid *body, const double a[
         double at = va / (va - vb);
         from = va > 0.0 && at > from ? at : from;
         to = va <= 0.0 && at < to ? at : to;
+        if (from > to) {
+            return false;
+        }
     }
     return from + 0x1p-48 <= to;
 }

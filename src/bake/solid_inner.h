@@ -5,8 +5,8 @@
 #include "solid.h"
 
 /* Add, for each flat convex face of an occluder whose surface is closed, what the surface goes round of what lies behind it, as
- * deep as nothing else of the surface comes in: the wings of a building. Bodies overlap where wings meet. The cell (its
- * corners) must be outside the occluder's bounds, else nothing is added. */
-umb_result umb_solids_add_inner(umb_solids *s, const umb_occluder *o, uint32_t number, const double box[8][3]);
+ * deep as nothing else of the surface comes in: the wings of a building. Bodies overlap where wings meet; one that another
+ * holds is left out. */
+umb_result umb_solids_add_inner(umb_solids *s, const umb_occluder *o, uint32_t number);
 
 #endif

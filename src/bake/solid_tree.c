@@ -3,8 +3,9 @@
 #include <math.h>
 #include <string.h>
 
-#define LEAF 4u
-#define DEPTH 64
+/* Each half of a run that is divided has an eighth of it at least, so ways down have at most 166 halvings; a node that is taken
+ * from the stack puts three more there than it takes. */
+#define STACK 512
 
 void umb_solid_tree_free(umb_solid_tree *t, const umb_allocator *a)
 {
@@ -50,29 +51,83 @@ static uint32_t divide(const umb_solids *s, uint32_t *items, uint32_t count, con
     return low < count / 8 || low > count - count / 8 || low == 0 || low == count ? count / 2 : low;
 }
 
+/* A run of items. */
+typedef struct run {
+    uint32_t first, count;
+} run;
+
+/* Into four at most: the longest is divided as long as there is one of several. Returns how many. */
+static uint32_t quarter(const umb_solids *s, uint32_t *items, run whole, run parts[4], umb_aabb boxes[4])
+{
+    uint32_t count = 1;
+    parts[0] = whole;
+    boxes[0] = box_of(s, items + whole.first, whole.count);
+    while (count < 4) {
+        uint32_t longest = 0;
+        for (uint32_t i = 1; i < count; ++i) {
+            longest = parts[i].count > parts[longest].count ? i : longest;
+        }
+        run r = parts[longest];
+        if (r.count < 2) {
+            break;
+        }
+        uint32_t low = divide(s, items + r.first, r.count, &boxes[longest]);
+        parts[longest].count = low;
+        boxes[longest] = box_of(s, items + r.first, low);
+        parts[count] = (run){r.first + low, r.count - low};
+        boxes[count] = box_of(s, items + r.first + low, r.count - low);
+        count += 1;
+    }
+    return count;
+}
+
+/* Larger than the box by more than rounding of either can be. */
+static void set_child(umb_solid_node *n, uint32_t i, const umb_aabb *box, uint32_t child)
+{
+    for (int k = 0; k < 3; ++k) {
+        float size = fmaxf(fabsf(box->min[k]), fabsf(box->max[k]));
+        n->middle[k][i] = 0.5f * (box->min[k] + box->max[k]);
+        n->half[k][i] = 0.5f * (box->max[k] - box->min[k]) + 0x1p-21f * size;
+    }
+    n->child[i] = child;
+}
+
+static void clear_node(umb_solid_node *n)
+{
+    for (int i = 0; i < 4; ++i) {
+        n->middle[0][i] = n->middle[1][i] = n->middle[2][i] = 0.0f;
+        n->half[0][i] = n->half[1][i] = n->half[2][i] = -INFINITY;
+        n->child[i] = UMB_SOLID_LEAF;
+    }
+}
+
+/* Until a node's children are made, its first two hold its run. */
 bool umb_solid_tree_build(umb_solid_tree *t, const umb_allocator *a, const umb_solids *s)
 {
     t->node_count = 0;
     if (s->count == 0) {
         return true;
     }
-    if (!umb_memory_reserve(a, (void **)&t->nodes, &t->node_capacity, 2 * s->count, sizeof *t->nodes) ||
+    if (!umb_memory_reserve(a, (void **)&t->nodes, &t->node_capacity, s->count, sizeof *t->nodes) ||
         !umb_memory_reserve(a, (void **)&t->items, &t->item_capacity, s->count, sizeof *t->items)) {
         return false;
     }
     for (uint32_t i = 0; i < s->count; ++i) {
         t->items[i] = i;
     }
-    t->nodes[t->node_count++] = (umb_solid_node){.first = 0, .count = (uint32_t)s->count};
+    t->nodes[t->node_count++] = (umb_solid_node){.child = {0, (uint32_t)s->count}};
     for (uint32_t n = 0; n < t->node_count; ++n) {
         umb_solid_node *node = &t->nodes[n];
-        node->box = box_of(s, t->items + node->first, node->count);
-        if (node->count > LEAF) {
-            uint32_t low = divide(s, t->items + node->first, node->count, &node->box), first = t->node_count;
-            t->nodes[t->node_count++] = (umb_solid_node){.first = node->first, .count = low};
-            t->nodes[t->node_count++] = (umb_solid_node){.first = node->first + low, .count = node->count - low};
-            node->first = first;
-            node->count = 0;
+        run parts[4];
+        umb_aabb boxes[4];
+        uint32_t count = quarter(s, t->items, (run){node->child[0], node->child[1]}, parts, boxes);
+        clear_node(node);
+        for (uint32_t i = 0; i < count; ++i) {
+            bool leaf = parts[i].count == 1;
+            set_child(node, i, &boxes[i], leaf ? t->items[parts[i].first] | UMB_SOLID_LEAF : t->node_count);
+            if (!leaf) {
+                t->nodes[t->node_count++] = (umb_solid_node){.child = {parts[i].first, parts[i].count}};
+            }
         }
     }
     return true;
@@ -107,26 +162,36 @@ static void put(uint32_t *heap, uint32_t *count, uint32_t most, uint32_t x)
     }
 }
 
+static umb_aabb child_box(const umb_solid_node *n, uint32_t i)
+{
+    umb_aabb box;
+    for (int k = 0; k < 3; ++k) {
+        box.min[k] = n->middle[k][i] - n->half[k][i];
+        box.max[k] = n->middle[k][i] + n->half[k][i];
+    }
+    return box;
+}
+
 uint32_t umb_solid_tree_find(const umb_solid_tree *t, const umb_solids *s, const umb_shaft *shaft, uint32_t most,
                              uint32_t *out)
 {
-    uint32_t stack[DEPTH * 2], waiting = 0, count = 0;
+    uint32_t stack[STACK], waiting = 0, count = 0;
     if (t->node_count > 0) {
         stack[waiting++] = 0;
     }
     while (waiting > 0) {
         const umb_solid_node *n = &t->nodes[stack[--waiting]];
-        if (umb_shaft_beside(shaft, &n->box)) {
-            continue;
-        }
-        if (n->count == 0) {
-            stack[waiting++] = n->first;
-            stack[waiting++] = n->first + 1;
-            continue;
-        }
-        for (uint32_t i = n->first; i < n->first + n->count; ++i) {
-            if (!umb_shaft_beside(shaft, &s->items[t->items[i]].bounds)) {
-                put(out, &count, most, t->items[i]);
+        for (uint32_t i = 0; i < 4; ++i) {
+            uint32_t child = n->child[i], body = child & ~UMB_SOLID_LEAF;
+            bool leaf = (child & UMB_SOLID_LEAF) != 0;
+            umb_aabb box = child_box(n, i);
+            if (n->half[0][i] < 0.0f || umb_shaft_beside(shaft, leaf ? &s->items[body].bounds : &box)) {
+                continue;
+            }
+            if (leaf) {
+                put(out, &count, most, body);
+            } else {
+                stack[waiting++] = child;
             }
         }
     }
@@ -137,4 +202,77 @@ uint32_t umb_solid_tree_find(const umb_solid_tree *t, const umb_solids *s, const
         sift_down(out, left - 1, 0);
     }
     return count;
+}
+
+/* ---- along a segment ------------------------------------------------------------------------------ */
+
+typedef float four __attribute__((vector_size(16)));
+typedef int32_t four_masks __attribute__((vector_size(16)));
+
+static inline four absolute(four x)
+{
+    return (four)((four_masks)x & 0x7FFFFFFF);
+}
+
+/* A segment: its middle, half of it, and how long that is along each axis. */
+typedef struct segment {
+    float middle[3], half[3], length[3];
+} segment;
+
+static segment make_segment(const double ends[2][3])
+{
+    segment s;
+    for (int k = 0; k < 3; ++k) {
+        s.middle[k] = (float)(0.5 * (ends[0][k] + ends[1][k]));
+        s.half[k] = (float)(0.5 * (ends[1][k] - ends[0][k]));
+        s.length[k] = fabsf(s.half[k]);
+    }
+    return s;
+}
+
+/* Which of the children the segment lies beside, along an axis or along one at right angles to an axis and to the segment. */
+static inline four_masks misses(const segment *s, const umb_solid_node *n)
+{
+    four at[3], half[3];
+    four_masks beside = {0};
+    for (int k = 0; k < 3; ++k) {
+        memcpy(&at[k], n->middle[k], sizeof at[k]);
+        memcpy(&half[k], n->half[k], sizeof half[k]);
+        at[k] = s->middle[k] - at[k];
+        beside |= absolute(at[k]) > half[k] + s->length[k];
+    }
+    for (int i = 0, j = 1; i < 3; ++i, j = j == 2 ? 0 : j + 1) {
+        beside |= absolute(s->half[i] * at[j] - s->half[j] * at[i]) > half[i] * s->length[j] + half[j] * s->length[i];
+    }
+    return beside;
+}
+
+umb_solids_along umb_solid_tree_along(const umb_solid_tree *t, const double (*first)[3], const double (*second)[3],
+                                      uint32_t most, uint32_t *out)
+{
+    uint32_t stack[STACK], waiting = 0;
+    segment s = make_segment(first), other = make_segment(second);
+    umb_solids_along found = {0, most};
+    if (t->node_count > 0) {
+        stack[waiting++] = 0;
+    }
+    while (waiting > 0) {
+        const umb_solid_node *n = &t->nodes[stack[--waiting]];
+        four_masks beside = misses(&s, n), beside_other = {0};
+        bool known = false;
+        for (uint32_t i = 0; i < 4; ++i) {
+            uint32_t child = n->child[i];
+            if (beside[i] != 0) {
+                continue;
+            }
+            if ((child & UMB_SOLID_LEAF) == 0) {
+                stack[waiting++] = child;
+            } else if (found.both_end < found.first_begin) {
+                beside_other = known ? beside_other : misses(&other, n);
+                known = true;
+                out[beside_other[i] == 0 ? found.both_end++ : --found.first_begin] = child & ~UMB_SOLID_LEAF;
+            }
+        }
+    }
+    return found;
 }

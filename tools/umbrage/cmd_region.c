@@ -32,6 +32,7 @@ static int make_query(const setup *s, const options *o, umb_region_query *out)
                               .umbrae = o->umbrae,
                               .outer = o->outer,
                               .half_umbra = options_given(o, "half-umbra"),
+                              .maps_only = options_given(o, "maps-only"),
                               .near_depth = options_given(o, "near") ? o->near_depth : 0.0};
     for (int k = 0; k < 3; ++k) {
         double a = o->cell[k], b = o->cell[3 + k];
@@ -67,9 +68,11 @@ static int print_json(const setup *s, const options *o, const report *r)
     json_text j = {0};
     json_text_open(&j, NULL, '{');
     json_text_count(&j, "objects", a->stats.objects);
+    json_text_count(&j, "maps", a->stats.mapped);
     json_text_count(&j, "pvs", a->pvs_count);
     json_text_count(&j, "upper", a->refined_count);
     json_text_count(&j, "objects_triangles", a->stats.triangles);
+    json_text_count(&j, "maps_triangles", a->stats.mapped_triangles);
     json_text_count(&j, "pvs_triangles", a->stats.pvs_triangles);
     json_text_count(&j, "upper_triangles", a->stats.refined_triangles);
     json_text_count(&j, "undecided", a->stats.undecided);
@@ -91,6 +94,7 @@ static int print_text(const setup *set, const options *o, const report *r)
     const umb_region_stats *s = &a->stats;
     printf("%-12s %12s %12s\n", "", "objects", "triangles");
     printf("%-12s %12u %12llu\n", "scene", s->objects, (unsigned long long)s->triangles);
+    printf("%-12s %12u %12llu\n", "maps", s->mapped, (unsigned long long)s->mapped_triangles);
     printf("%-12s %12u %12llu   %.3f ms\n", "pvs", a->pvs_count, (unsigned long long)s->pvs_triangles,
            r->solve_ms);
     printf("%-12s %12u %12llu   %.3f ms\n", "refined", a->refined_count,

@@ -490,6 +490,7 @@ static const option_spec specs[] = {
     {"umbrae", 0, BIT(REGION), "K", read_umbrae, "intervals kept a direction, 1 to 8 (default 2; all round: 8)"},
     {"outer", 0, BIT(REGION), "R", read_outer, "rays by two squares, the outer R times the inner (default: slabs)"},
     {"half-umbra", 0, BIT(REGION), NULL, read_flag, "only what stands on the ground hides, and only its top counts"},
+    {"maps-only", 0, BIT(REGION), NULL, read_flag, "answer from the occlusion maps alone: no look at single bodies"},
     {"all-round", 0, BIT(REGION), NULL, read_flag, "no vertical: rays in six directions, for scenes as high as wide"},
     {"only", 0, BIT(CULL) | MANY_VIEWS, "IDS", read_only, "ask about these objects alone: 3,17,40-60; the others still hide"},
     {"without", 0, BIT(CULL) | MANY_VIEWS, "IDS", read_without, "as if these objects were not there: they hide nothing"},
