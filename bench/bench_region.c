@@ -4,7 +4,7 @@
  *                     [--log FILE [--seconds N]]
  *
  * DATA is bench/papers/leyvand.csv, which says what is measured. Prints Markdown tables: times are processor time, the least of
- * --repeat (3) answers (of the refinement: of one) on one core, sets in triangles of their objects and in objects. "Seen" is what --rays (2M)
+ * --repeat (3) answers (of the refinement: of one; cold: of a new engine's first) on one core, sets in triangles of their objects and in objects. "Seen" is what --rays (2M)
  * rays from the cell prove; what an answer lacks of it is a miss; with --rays 0 nobody looks and the time to load is short. --effort: of the
  * refinement (0, the default: the library's own; none: no refinement). --only: rows whose table or label contains TEXT, or one of several
  * with commas between;
@@ -32,9 +32,9 @@ typedef struct place {
 
 /* What one answer of the engine costs and holds. */
 typedef struct answer {
-    double solve_ms, refine_ms;
+    double solve_ms, cold_ms, refine_ms;
     uint64_t pvs_triangles, refined_triangles;
-    uint32_t pvs, refined, misses;
+    uint32_t mapped, pvs, refined, misses;
 } answer;
 
 typedef struct row {
@@ -263,17 +263,24 @@ static bool make_query(const study *s, const world *w, const row *r, umb_region_
 static bool ask(study *s, world *w, const umb_region_query *q, bool refine, answer *out,
                 umb_region_answer *a)
 {
+    umb_region_def def = {.error = &s->error};
     *out = (answer){.solve_ms = INFINITY};
-    umb_result result = UMB_OK;
+    umb_region_destroy(w->region);
+    w->region = NULL;
+    umb_result result = umb_region_create(w->index, &def, &w->region);
     for (uint32_t k = 0; result == UMB_OK && k <= s->repeat; ++k) {
         double start = processor_ms();
         result = umb_region_solve(w->region, q, a);
-        if (k > 0) { /* the first one grows buffers */
-            out->solve_ms = fmin(out->solve_ms, processor_ms() - start);
-        }
+        double ms = processor_ms() - start;
+        out->cold_ms = k == 0 ? ms : out->cold_ms; /* grows buffers, finds bodies */
+        out->solve_ms = k > 0 ? fmin(out->solve_ms, ms) : out->solve_ms;
     }
+    if (result != UMB_OK) {
+        return false;
+    }
+    out->mapped = a->stats.mapped;
     double start = processor_ms();
-    if (result == UMB_OK && refine) {
+    if (refine) {
         result = umb_region_refine(w->region, s->effort, a);
     }
     out->refine_ms = processor_ms() - start;
@@ -357,6 +364,7 @@ static bool measure(study *s, world *w, row *r)
         (void)make_query(s, w, &thesis, &q);
         q.outer = 2.0;
         q.umbrae = 1;
+        q.maps_only = true;
         if (!ask(s, w, &q, false, &r->thesis, &a)) {
             return false;
         }
@@ -384,8 +392,8 @@ static void name_row(const row *r, char *out, size_t size)
                    r->height, r->resolution, r->umbrae, r->outer, r->way);
 }
 
-#define ANSWER_OUT "%.17g %.17g %" PRIu64 " %" PRIu64 " %u %u %u"
-#define ANSWER_IN "%lg %lg %" SCNu64 " %" SCNu64 " %u %u %u"
+#define ANSWER_OUT "%.17g %.17g %.17g %" PRIu64 " %" PRIu64 " %u %u %u %u"
+#define ANSWER_IN "%lg %lg %lg %" SCNu64 " %" SCNu64 " %u %u %u %u"
 
 static bool keep(study *s, const row *r)
 {
@@ -402,8 +410,8 @@ static bool keep(study *s, const row *r)
     (void)fprintf(f, "%s|%u %" PRIu64 " %" PRIu64 " %" PRIu64, name, r->seen, r->seen_triangles, r->met, r->rays);
     for (int k = 0; k < 2; ++k) {
         const answer *a = k == 0 ? &r->ours : &r->thesis;
-        (void)fprintf(f, " " ANSWER_OUT, a->solve_ms, a->refine_ms, a->pvs_triangles, a->refined_triangles, a->pvs, a->refined,
-                      a->misses);
+        (void)fprintf(f, " " ANSWER_OUT, a->solve_ms, a->cold_ms, a->refine_ms, a->pvs_triangles, a->refined_triangles,
+                      a->mapped, a->pvs, a->refined, a->misses);
     }
     (void)fprintf(f, "\n");
     return fclose(f) == 0;
@@ -421,9 +429,10 @@ static void take_up(study *s, const char *line)
         }
         answer *a = &r->ours, *b = &r->thesis;
         r->done = sscanf(line + length + 1, "%u %" SCNu64 " %" SCNu64 " %" SCNu64 " " ANSWER_IN " " ANSWER_IN, &r->seen,
-                         &r->seen_triangles, &r->met, &r->rays, &a->solve_ms, &a->refine_ms, &a->pvs_triangles,
-                         &a->refined_triangles, &a->pvs, &a->refined, &a->misses, &b->solve_ms, &b->refine_ms,
-                         &b->pvs_triangles, &b->refined_triangles, &b->pvs, &b->refined, &b->misses) == 18;
+                         &r->seen_triangles, &r->met, &r->rays, &a->solve_ms, &a->cold_ms, &a->refine_ms,
+                         &a->pvs_triangles, &a->refined_triangles, &a->mapped, &a->pvs, &a->refined, &a->misses, &b->solve_ms,
+                         &b->cold_ms, &b->refine_ms, &b->pvs_triangles, &b->refined_triangles, &b->mapped, &b->pvs, &b->refined,
+                         &b->misses) == 22;
     }
 }
 
@@ -522,8 +531,8 @@ static void print_row(const row *r)
 {
     said objects = said_of(r, r->ours.refined, r->seen);
     said triangles = said_of(r, r->ours.refined_triangles, r->seen_triangles);
-    printf("| %s | %.1f | %.0f | %u | %u | %s | %" PRIu64 " | %" PRIu64 " | %s | %.2f | %s | %u |\n",
-           r->label, r->ours.solve_ms, r->ours.refine_ms, r->ours.pvs, r->ours.refined, objects.seen,
+    printf("| %s | %.1f | %.0f | %.0f | %u | %u | %u | %s | %" PRIu64 " | %" PRIu64 " | %s | %.2f | %s | %u |\n",
+           r->label, r->ours.solve_ms, r->ours.cold_ms, r->ours.refine_ms, r->ours.mapped, r->ours.pvs, r->ours.refined, objects.seen,
            r->ours.pvs_triangles, r->ours.refined_triangles, triangles.seen,
            over(r->ours.pvs, r->ours.refined), objects.ratio, r->ours.misses + r->thesis.misses);
 }
@@ -567,10 +576,9 @@ static void print_table(const study *s, const char *table)
         }
         puts("");
     }
-    puts("| | ms | refine ms | PVS objects | refined | seen | PVS triangles | refined | seen | "
-         "PVS/refined, "
-         "objects | refined/seen | misses |");
-    puts("|---|---|---|---|---|---|---|---|---|---|---|---|");
+    puts("| | ms | cold ms | refine ms | maps' objects | PVS | refined | seen | PVS triangles | refined | seen | "
+         "PVS/refined, objects | refined/seen | misses |");
+    puts("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|");
     for (uint32_t i = 0; i < s->row_count; ++i) {
         if (s->rows[i].done && strcmp(s->rows[i].table, table) == 0) {
             print_row(&s->rows[i]);
@@ -581,7 +589,7 @@ static void print_table(const study *s, const char *table)
 /* Two plots of a sweep: times, and sizes of sets in objects. */
 static bool plot_table(study *s, const char *table)
 {
-    static const svg_dots_series times[] = {{"occlusion maps", "#1f6feb", false},
+    static const svg_dots_series times[] = {{"PVS", "#1f6feb", false},
                                             {"refinement", "#d9822b", false}};
     static const svg_dots_series sizes[] = {{"seen by a ray", "#1f8a85", false},
                                             {"refined", "#d9822b", false},
