@@ -43,17 +43,17 @@ static double axis_squared(const umb_beam_part *p, int a)
     return length_squared(half);
 }
 
-/* Half of a part along an axis; halves of boxes overlap by far more than rounding can part them. */
-static umb_beam_part half_of(const umb_beam_part *p, int axis, double side)
+umb_beam_part umb_beam_cut(const umb_beam_part *p, int axis, double share, bool upper)
 {
     umb_beam_part h = *p;
     double *from = axis == 0 ? h.middle : h.axes[axis - 1], *to = axis == 2 ? h.middle : h.axes[axis];
+    double size = upper ? 1.0 - share : share, at = upper ? share : share - 1.0;
     for (int k = 0; k < 3; ++k) {
         if (p->triangle) {
-            *(side < 0.0 ? &to[k] : &from[k]) = 0.5 * (from[k] + to[k]);
+            *(upper ? &from[k] : &to[k]) = from[k] + share * (to[k] - from[k]);
         } else {
-            h.axes[axis][k] = 0.5 * p->axes[axis][k] * (1.0 + 0x1p-24);
-            h.middle[k] = p->middle[k] + side * 0.5 * p->axes[axis][k];
+            h.axes[axis][k] = size * p->axes[axis][k] * (1.0 + 0x1p-24);
+            h.middle[k] = p->middle[k] + at * p->axes[axis][k];
         }
     }
     return h;
@@ -223,9 +223,9 @@ static bool trials_blocked(const umb_solids *solids, const umb_beam_part *a, con
     return true;
 }
 
-/* Where a beam is cut: one of the axes of both parts. */
+/* Where a beam is cut: one of the axes of both parts; more is blocked towards its end (upper) or its beginning. */
 typedef struct place {
-    bool target;
+    bool target, upper;
     int axis;
 } place;
 
@@ -258,10 +258,25 @@ static bool find_place(const umb_beam_part *a, const umb_beam_part *b, uint64_t 
         int score = abs(high - low) + whole + HALVED * ilogb(size) / 2;
         if (score > best) {
             best = score;
-            *out = (place){k >= 3, k % 3};
+            *out = (place){k >= 3, high > low, k % 3};
         }
     }
     return best > INT32_MIN;
+}
+
+/* Where to cut so that a body blocks all of what is on the better side, as much as it can; 0: it blocks not even a quarter. */
+static double trim(const umb_solids *s, const umb_beam_part *a, const umb_beam_part *b, uint32_t body, const place *at)
+{
+    for (double size = 0.75; size > 0.0; size -= 0.25) {
+        double share = at->upper ? 1.0 - size : size, from[8][3], to[8][3];
+        umb_beam_part part = umb_beam_cut(at->target ? b : a, at->axis, share, at->upper);
+        umb_beam_corners(at->target ? a : &part, from);
+        umb_beam_corners(at->target ? &part : b, to);
+        if (umb_solid_blocks_all(s, &s->items[body], (const double(*)[3])from, (const double(*)[3])to)) {
+            return share;
+        }
+    }
+    return 0.0;
 }
 
 /* Whatever of the segments between corners no body meets will still be there in some part, however small: then it is no
@@ -283,9 +298,14 @@ static bool blocked(umb_beam_search *s, const umb_beam_part *a, const umb_beam_p
     if (!find_place(a, b, most, LEAST_PART * s->solids->reach, &at)) {
         return false;
     }
-    for (int side = -1; side <= 1; side += 2) {
-        umb_beam_part half = half_of(at.target ? b : a, at.axis, side);
-        if (!blocked(s, at.target ? a : &half, at.target ? &half : b, bodies, n, false)) {
+    double share = trim(s->solids, a, b, bodies[0], &at);
+    for (int side = 0; side < 2; ++side) {
+        bool upper = side == 0 ? !at.upper : at.upper;
+        if (side == 1 && share > 0.0) {
+            break; /* blocked, as trim found */
+        }
+        umb_beam_part part = umb_beam_cut(at.target ? b : a, at.axis, share > 0.0 ? share : 0.5, upper);
+        if (!blocked(s, at.target ? a : &part, at.target ? &part : b, bodies, n, false)) {
             return false;
         }
     }

@@ -27,6 +27,10 @@ umb_beam_part umb_beam_triangle(const double corners[3][3]);
 void umb_beam_corners(const umb_beam_part *p, double out[8][3]);
 void umb_beam_bounds(const umb_beam_part *p, double min[3], double max[3]);
 
+/* A part of a part along an axis: the share at its beginning, or the rest (upper); of a triangle along the edge from that corner.
+ * Both parts of a box overlap by far more than rounding can part them; of a triangle they have the cut in common. */
+umb_beam_part umb_beam_cut(const umb_beam_part *p, int axis, double share, bool upper);
+
 typedef struct umb_beam_search {
     const umb_solids *solids;
     uint32_t effort; /* beams that may still be looked at */

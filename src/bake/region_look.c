@@ -16,7 +16,7 @@
 #include "region_state.h"
 
 #define CHUNK 64
-#define MOST_VERTICES 192 /* of an object whose highest one is looked for */
+#define MOST_VERTICES 64  /* of an object whose highest one is looked for */
 #define MOST_BODIES 256   /* along a segment */
 #define MOST_PLANES 2000000 /* that are kept from one cell to the next */
 
@@ -99,21 +99,20 @@ typedef struct looking {
     uint32_t up;
 } looking;
 
-/* The highest corner of the object's triangles. False: it has none that are the object's own, or very many. */
+/* The highest vertex of the object's triangles, which use all positions. False: it has none that are its own, or very many. */
 static bool highest_point(const umb_object *o, uint32_t up, double out[3])
 {
     const umb_mesh *m = o->mesh;
-    if (!o->refine || m->seen_count == 0 || 3 * m->seen_count > MOST_VERTICES) {
+    if (!o->refine || m->seen_count == 0 || m->position_count > MOST_VERTICES) {
         return false;
     }
     float highest[3] = {0.0f, 0.0f, 0.0f};
-    for (uint32_t i = 0; i < 3 * m->seen_count; ++i) {
-        const float *v = m->positions[m->triangles[i / 3][i % 3]];
+    for (uint32_t i = 0; i < m->position_count; ++i) {
         float w[3];
         if (o->identity) {
-            memcpy(w, v, sizeof w);
+            memcpy(w, m->positions[i], sizeof w);
         } else {
-            umb_transform_point(&o->transform, v, w);
+            umb_transform_point(&o->transform, m->positions[i], w);
         }
         if (i == 0 || w[up] > highest[up]) {
             memcpy(highest, w, sizeof w);
