@@ -6,6 +6,7 @@
 
 #define LEAST_PART 0x1p-19
 #define TRIALS 96
+#define MOST_CUTS 100 /* one after another */
 /* What a cut is worth: segments that it parts, a half that needs no further cut, how long what is cut is. These left the fewest
  * objects undecided in cities and box fields. */
 #define WHOLE 64
@@ -50,7 +51,9 @@ umb_beam_part umb_beam_cut(const umb_beam_part *p, int axis, double share, bool 
     double size = upper ? 1.0 - share : share, at = upper ? share : share - 1.0;
     for (int k = 0; k < 3; ++k) {
         if (p->triangle) {
-            *(upper ? &from[k] : &to[k]) = from[k] + share * (to[k] - from[k]);
+            double middle = 0.5 * (from[k] + to[k]);
+            double at_share = share < 0.5 ? 0.5 * (from[k] + middle) : share > 0.5 ? 0.5 * (middle + to[k]) : middle;
+            *(upper ? &from[k] : &to[k]) = at_share;
         } else {
             h.axes[axis][k] = size * p->axes[axis][k] * (1.0 + 0x1p-24);
             h.middle[k] = p->middle[k] + at * p->axes[axis][k];
@@ -282,16 +285,20 @@ static double trim(const umb_solids *s, const umb_beam_part *a, const umb_beam_p
 /* Whatever of the segments between corners no body meets will still be there in some part, however small: then it is no
  * use to go on. */
 static bool blocked(umb_beam_search *s, const umb_beam_part *a, const umb_beam_part *b, uint32_t *bodies, uint32_t count,
-                    bool whole)
+                    uint32_t cuts)
 {
     uint32_t n;
     uint64_t most;
-    if (s->effort == 0) {
+    if (s->effort == 0 || cuts == MOST_CUTS) {
         return false;
     }
     s->effort -= 1;
     verdict v = look_at(s->solids, a, b, bodies, count, &n, &most);
-    if (v != SHARED || (whole && !trials_blocked(s->solids, a, b, bodies, n))) {
+    if (v == SHARED && cuts == 0 && !trials_blocked(s->solids, a, b, bodies, n)) {
+        v = OPEN;
+    }
+    s->open = s->open || v == OPEN;
+    if (v != SHARED) {
         return v == BLOCKED;
     }
     place at;
@@ -305,7 +312,7 @@ static bool blocked(umb_beam_search *s, const umb_beam_part *a, const umb_beam_p
             break; /* blocked, as trim found */
         }
         umb_beam_part part = umb_beam_cut(at.target ? b : a, at.axis, share > 0.0 ? share : 0.5, upper);
-        if (!blocked(s, at.target ? a : &part, at.target ? &part : b, bodies, n, false)) {
+        if (!blocked(s, at.target ? a : &part, at.target ? &part : b, bodies, n, cuts + 1)) {
             return false;
         }
     }
@@ -314,5 +321,5 @@ static bool blocked(umb_beam_search *s, const umb_beam_part *a, const umb_beam_p
 
 bool umb_beam_blocked(umb_beam_search *s, const umb_beam_part *a, const umb_beam_part *b, uint32_t *bodies, uint32_t count)
 {
-    return blocked(s, a, b, bodies, count, true);
+    return blocked(s, a, b, bodies, count, 0);
 }

@@ -14,9 +14,9 @@ typedef struct umb_beam_part {
 } umb_beam_part;
 
 /* Boxes are larger than what they stand for by this much of the reach, hundreds of times what sums of their corners
- * lose on the way down; none is cut whose halves would overlap by less than that. Triangles are taken as they are: halving one
- * moves points of it by 2^-53 of the reach, sixty times at most, and bodies are smaller than what they stand for by 2^-45.4 of it
- * more than values of their planes are off. */
+ * lose on the way down; none is cut whose parts would overlap by less than that. Triangles are taken as they are: cutting one
+ * moves points of it by 1.5 times 2^-53 of the reach, a hundred times at most, and bodies are smaller than what they stand for by
+ * 2^-45.4 of it more than values of their planes are off. */
 #define UMB_BEAM_MARGIN 0x1p-44
 
 #define UMB_BEAM_BODIES 1024
@@ -27,17 +27,18 @@ umb_beam_part umb_beam_triangle(const double corners[3][3]);
 void umb_beam_corners(const umb_beam_part *p, double out[8][3]);
 void umb_beam_bounds(const umb_beam_part *p, double min[3], double max[3]);
 
-/* A part of a part along an axis: the share at its beginning, or the rest (upper); of a triangle along the edge from that corner.
+/* A part of a part along an axis: the share (1/4, 1/2 or 3/4) at its beginning, or the rest (upper); of a triangle along the edge from that corner.
  * Both parts of a box overlap by far more than rounding can part them; of a triangle they have the cut in common. */
 umb_beam_part umb_beam_cut(const umb_beam_part *p, int axis, double share, bool upper);
 
 typedef struct umb_beam_search {
     const umb_solids *solids;
     uint32_t effort; /* beams that may still be looked at */
+    bool open;       /* set: no body meets some segment */
 } umb_beam_search;
 
 /* True if every segment from a to b is blocked. bodies: those that may meet one, at most UMB_BEAM_BODIES; their order is
- * changed. False with effort 0: not decided. */
+ * changed. False without s->open: not decided. */
 bool umb_beam_blocked(umb_beam_search *s, const umb_beam_part *a, const umb_beam_part *b, uint32_t *bodies, uint32_t count);
 
 #endif

@@ -29,10 +29,10 @@ static uint8_t decide_part(const refinement *f, const umb_beam_part *target, uin
     umb_beam_bounds(target, min[1], max[1]);
     umb_shaft_make(&shaft, (const double(*)[3])min, (const double(*)[3])max);
     uint32_t count = umb_solid_tree_find(&f->region->solid_tree, solids, &shaft, UMB_BEAM_BODIES, bodies);
-    umb_beam_search s = {solids, *effort};
+    umb_beam_search s = {solids, *effort, false};
     bool hidden = umb_beam_blocked(&s, &f->cell, target, bodies, count);
     *effort = s.effort;
-    return hidden ? UMB_HIDDEN : s.effort == 0 ? UMB_UNDECIDED : UMB_STAYS;
+    return hidden ? UMB_HIDDEN : s.open ? UMB_STAYS : UMB_UNDECIDED;
 }
 
 /* All of its triangles, as the scene shows them. */
