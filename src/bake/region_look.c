@@ -26,7 +26,7 @@ umb_result umb_region_find_bodies(umb_region *r)
     const umb_committed *c = umb_scene_committed(umb_index_scene(r->index));
     const double(*corners)[3] = (const double(*)[3])r->corners;
     umb_solids *found = &r->found, *own = &r->solids;
-    bool stale = r->found_version != c->version || found->reach != r->reach || found->plane_count > MOST_PLANES;
+    bool stale = found->runs == NULL || r->found_version != c->version || found->reach != r->reach || found->plane_count > MOST_PLANES;
     if (stale && !umb_solids_begin(found, c->occluder_count, r->reach)) {
         return UMB_ERROR_MEMORY;
     }
