@@ -531,10 +531,10 @@ static void print_row(const row *r)
 {
     said objects = said_of(r, r->ours.refined, r->seen);
     said triangles = said_of(r, r->ours.refined_triangles, r->seen_triangles);
-    printf("| %s | %.1f | %.0f | %.0f | %u | %u | %u | %s | %" PRIu64 " | %" PRIu64 " | %s | %.2f | %s | %u |\n",
+    printf("| %s | %.1f | %.0f | %.0f | %u | %u | %u | %s | %" PRIu64 " | %" PRIu64 " | %s | %.2f | %s | %.0f | %u |\n",
            r->label, r->ours.solve_ms, r->ours.cold_ms, r->ours.refine_ms, r->ours.mapped, r->ours.pvs, r->ours.refined, objects.seen,
            r->ours.pvs_triangles, r->ours.refined_triangles, triangles.seen,
-           over(r->ours.pvs, r->ours.refined), objects.ratio, r->ours.misses + r->thesis.misses);
+           over(r->ours.pvs, r->ours.refined), objects.ratio, 1e-6 * (double)r->rays, r->ours.misses + r->thesis.misses);
 }
 
 /* Without refinement and rays. */
@@ -577,8 +577,8 @@ static void print_table(const study *s, const char *table)
         puts("");
     }
     puts("| | ms | cold ms | refine ms | maps' objects | PVS | refined | seen | PVS triangles | refined | seen | "
-         "PVS/refined, objects | refined/seen | misses |");
-    puts("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|");
+         "PVS/refined, objects | refined/seen | rays, millions | misses |");
+    puts("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|");
     for (uint32_t i = 0; i < s->row_count; ++i) {
         if (s->rows[i].done && strcmp(s->rows[i].table, table) == 0) {
             print_row(&s->rows[i]);
