@@ -254,7 +254,7 @@ static double depth_in(const umb_solids *s, const umb_solid *b, const double x[3
 {
     double most = -INFINITY;
     for (uint32_t k = 0; k < b->plane_count; ++k) {
-        const double *p = s->planes[b->first_plane + k];
+        const double *p = s->planes[b->first_plane + k].plane;
         most = fmax(most, p[0] * x[0] + p[1] * x[1] + p[2] * x[2] + p[3]);
     }
     return -most;
@@ -265,7 +265,7 @@ static bool corner_of(dice *d, const umb_solids *s, const umb_solid *b, double o
 {
     double m[3][4];
     for (int i = 0; i < 3; ++i) {
-        memcpy(m[i], s->planes[b->first_plane + dice_roll(d, b->plane_count)], sizeof m[i]);
+        memcpy(m[i], s->planes[b->first_plane + dice_roll(d, b->plane_count)].plane, sizeof m[i]);
     }
     double minors[3][3], det = 0.0;
     for (int i = 0; i < 3; ++i) {
@@ -317,9 +317,7 @@ static void test_inner_bodies(void **state)
         }
         open_case(&s, way == 0 ? NULL : &t, way == 2, &c);
         umb_solids found = {.allocator = &c.allocator, .reach = 200.0};
-        double corners[8][3], min[3] = {150, 150, 150}, max[3] = {151, 152, 151};
-        umb_box_corners(min, max, corners);
-        assert_int_equal(umb_solids_add_inner(&found, &c.occluder, 0, (const double(*)[3])corners), UMB_OK);
+        assert_int_equal(umb_solids_add_inner(&found, &c.occluder, 0), UMB_OK);
         bodies += (uint32_t)found.count;
         inside += check_bodies(&d, &c, &found);
         umb_solids_free(&found);
@@ -523,13 +521,15 @@ static void test_touching(void **state)
     for (uint32_t n = 0; n < times(400); ++n) {
         surface s;
         solid_case c;
-        bool added;
         double corners[8][3], min[3] = {-90, -90, -90}, max[3] = {-80, -81, -82};
         make_convex(&d, &s);
         open_case(&s, NULL, false, &c);
-        umb_solids found = {.allocator = &c.allocator, .reach = 128.0};
+        umb_solids found = {.allocator = &c.allocator};
         umb_box_corners(min, max, corners);
-        assert_int_equal(umb_solids_add(&found, &c.occluder, 0, (const double(*)[3])corners, &added), UMB_OK);
+        assert_true(umb_solids_begin(&found, 1, 128.0));
+        assert_int_equal(umb_solids_find(&found, &c.occluder, 0), UMB_OK);
+        assert_true(umb_solids_apart(&found, &c.occluder, 0, (const double(*)[3])corners));
+        bool added = found.count > 0 && c.mesh->convex;
         bodies += added ? 1 : 0;
         for (int i = 0; i < 40 && added; ++i) {
             double p[2][3], a[8][3], b[8][3];
@@ -555,7 +555,7 @@ static void test_touching(void **state)
 
 typedef struct wall {
     umb_solid items[5];
-    double planes[30][4];
+    umb_solid_plane planes[30];
     umb_solids solids;
 } wall;
 
@@ -568,11 +568,12 @@ static void add_box(wall *w, const double min[3], const double max[3])
         w->items[at].bounds.min[k] = nextafterf((float)min[k], -INFINITY);
         w->items[at].bounds.max[k] = nextafterf((float)max[k], INFINITY);
         w->items[at].inner[k] = 0.5 * (min[k] + max[k]);
-        double *low = w->planes[6 * at + 2 * (size_t)k], *high = low + 4;
-        low[k] = -1.0;
-        low[3] = min[k];
-        high[k] = 1.0;
-        high[3] = -max[k];
+        umb_solid_plane *low = &w->planes[6 * at + 2 * (size_t)k], *high = low + 1;
+        low->plane[k] = -1.0;
+        low->plane[3] = min[k];
+        high->plane[k] = 1.0;
+        high->plane[3] = -max[k];
+        low->beyond = high->beyond = INFINITY;
     }
 }
 

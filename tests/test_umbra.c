@@ -133,7 +133,7 @@ static void test_corners(void **state)
     umb_allocator a = umb_memory_allocator(NULL);
     dice d = {13};
     uint32_t all = 0, rounds = is_small() ? 3000 : 60000;
-    double planes[6][4];
+    umb_solid_plane planes[6];
     umb_solid body = {.plane_count = 6};
     umb_solids solids = {.allocator = &a, .items = &body, .planes = planes, .count = 1};
     for (uint32_t i = 0; i < rounds; ++i) {
@@ -146,9 +146,9 @@ static void test_corners(void **state)
                 max[s][k] = min[s][k] + between(&d, 0, 1.5);
             }
             for (int s = 0; s < 2; ++s) {
-                memset(planes[2 * k + s], 0, sizeof planes[0]);
-                planes[2 * k + s][k] = s == 0 ? 1.0 : -1.0;
-                planes[2 * k + s][3] = s == 0 ? -high[k] : low[k];
+                memset(&planes[2 * k + s], 0, sizeof planes[0]);
+                planes[2 * k + s].plane[k] = s == 0 ? 1.0 : -1.0;
+                planes[2 * k + s].plane[3] = s == 0 ? -high[k] : low[k];
             }
         }
         umb_box_corners(min[0], max[0], corners[0]);
