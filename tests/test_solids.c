@@ -352,6 +352,156 @@ static void test_touching(void **state)
     assert_true(bodies > 50);
 }
 
+/* ---- the cell beside an occluder ------------------------------------------------------------------- */
+
+/* The box has nothing in common with the bounds of the points, or lies beyond all of them as a triangle's plane sees it. Whole
+ * numbers and their 1024ths: nothing of it is rounded. */
+static bool surely_apart(const solid_case *c, const double box[8][3], bool planes)
+{
+    const umb_aabb *b = &c->occluder.bounds;
+    bool apart = false;
+    for (int k = 0; k < 3; ++k) {
+        apart = apart || box[0][k] > b->max[k] || box[7][k] < b->min[k];
+    }
+    for (uint32_t t = 0; t < c->mesh->triangle_count && planes && !apart; ++t) {
+        const uint32_t *v = c->mesh->triangles[t];
+        double e[2][3], n[3], most = -INFINITY, least = INFINITY;
+        for (int k = 0; k < 3; ++k) {
+            e[0][k] = (double)c->points[v[1]][k] - c->points[v[0]][k];
+            e[1][k] = (double)c->points[v[2]][k] - c->points[v[0]][k];
+        }
+        for (int k = 0; k < 3; ++k) {
+            n[k] = e[0][(k + 1) % 3] * e[1][(k + 2) % 3] - e[0][(k + 2) % 3] * e[1][(k + 1) % 3];
+        }
+        for (uint32_t i = 0; i < c->mesh->position_count; ++i) {
+            most = fmax(most, n[0] * c->points[i][0] + n[1] * c->points[i][1] + n[2] * c->points[i][2]);
+        }
+        for (int i = 0; i < 8; ++i) {
+            least = fmin(least, n[0] * box[i][0] + n[1] * box[i][1] + n[2] * box[i][2]);
+        }
+        apart = least > most;
+    }
+    return apart;
+}
+
+/* Somewhere near a corner of the occluder, by whole numbers or a little off. */
+static void draw_beside(dice *d, const solid_case *c, double box[8][3])
+{
+    double min[3], max[3];
+    const float *p = c->points[dice_roll(d, c->mesh->position_count)];
+    bool touching = dice_roll(d, 2) == 0;
+    for (int k = 0; k < 3; ++k) {
+        double size = dice_roll(d, 6), off = touching ? 0.0 : ((int)dice_roll(d, 3) - 1) / 1024.0;
+        min[k] = p[k] + (int)dice_roll(d, 9) - 4.0 + off;
+        max[k] = min[k] + size;
+        if (dice_roll(d, 4) == 0) { /* a corner that is the point's */
+            min[k] = dice_roll(d, 2) == 0 ? p[k] + off : p[k] + off - size;
+            max[k] = min[k] + size;
+        }
+    }
+    umb_box_corners(min, max, box);
+}
+
+/* A box is apart if the reference says so: by planes too if the occluder is one body that is convex. */
+static void test_apart(void **state)
+{
+    (void)state;
+    dice d = {77};
+    uint32_t apart = 0, by_planes = 0, near = 0;
+    for (uint32_t n = 0; n < times(800); ++n) {
+        surface s;
+        solid_case c;
+        if (n % 2 == 0) {
+            make_convex(&d, &s);
+        } else {
+            make_surface((int)(n / 2 % CASES), &s);
+        }
+        open_case(&s, NULL, false, &c);
+        umb_solids found = {.allocator = &c.allocator};
+        assert_true(umb_solids_begin(&found, 1, 128.0));
+        assert_int_equal(umb_solids_find(&found, &c.occluder, 0), UMB_OK);
+        for (int i = 0; i < 40; ++i) {
+            double box[8][3];
+            draw_beside(&d, &c, box);
+            bool is = umb_solids_apart(&found, &c.occluder, 0, (const double(*)[3])box);
+            bool planes = c.mesh->convex && found.count == 1;
+            assert_int_equal(is, surely_apart(&c, (const double(*)[3])box, planes));
+            apart += is ? 1 : 0;
+            near += is ? 0 : 1;
+            by_planes += is && !surely_apart(&c, (const double(*)[3])box, false) ? 1 : 0;
+        }
+        umb_solids_free(&found);
+        close_case(&c);
+    }
+    printf("%u apart, %u of them by planes, %u not\n", apart, by_planes, near);
+    assert_true(apart > 3000 && by_planes > 500 && near > 3000);
+}
+
+/* ---- all segments at once --------------------------------------------------------------------------- */
+
+/* Planes around a ball. */
+static void draw_ball(dice *d, uint32_t planes, umb_solid *body, umb_solid_plane *out)
+{
+    double radius = dice_between(d, 1, 5);
+    *body = (umb_solid){.plane_count = planes};
+    for (uint32_t i = 0; i < planes; ++i) {
+        double n[3], length = 0.0;
+        for (int k = 0; k < 3; ++k) {
+            n[k] = i < 6 ? (i / 2 == (uint32_t)k ? (i % 2 == 0 ? 1.0 : -1.0) : 0.0) : dice_between(d, -1, 1);
+            length += n[k] * n[k];
+        }
+        for (int k = 0; k < 3; ++k) {
+            out[i].plane[k] = n[k] / sqrt(length);
+        }
+        out[i].plane[3] = -radius * dice_between(d, 0.9, 1.1);
+        out[i].beyond = INFINITY;
+    }
+}
+
+/* Eight points: a box, flat ones too, or any. */
+static void draw_eight(dice *d, double x, double out[8][3])
+{
+    double min[3], max[3], size = exp(dice_between(d, log(1e-3), log(3.0)));
+    uint32_t kind = dice_roll(d, 5);
+    for (int k = 0; k < 3; ++k) {
+        min[k] = (k == 0 ? x : 0.0) + (kind == 4 ? (double)((int)dice_roll(d, 7) - 3) : dice_between(d, -3, 3));
+        max[k] = min[k] + (kind == 0 ? 0.0 : kind == 4 ? (double)dice_roll(d, 3) : size * dice_between(d, 0, 1));
+    }
+    umb_box_corners(min, max, out);
+    for (int i = 0; i < 8 && kind == 1; ++i) {
+        for (int k = 0; k < 3; ++k) {
+            out[i][k] += size * dice_between(d, -1, 1);
+        }
+    }
+}
+
+static void test_blocks_all(void **state)
+{
+    (void)state;
+    dice d = {78};
+    uint32_t all[2] = {0, 0}, some[2] = {0, 0};
+    umb_solid body;
+    umb_solid_plane planes[64];
+    umb_solids solids = {.items = &body, .planes = planes, .count = 1};
+    for (uint32_t n = 0; n < times(20000); ++n) {
+        double a[8][3], b[8][3];
+        uint32_t count = n % 4 == 0 ? 31 + dice_roll(&d, 4) : n % 2 == 0 ? 40 + dice_roll(&d, 24) : 6 + dice_roll(&d, 8);
+        memset(planes, 0, sizeof planes);
+        draw_ball(&d, count, &body, planes);
+        draw_eight(&d, dice_roll(&d, 8) == 0 ? 0.0 : -8.0, a);
+        draw_eight(&d, dice_roll(&d, 8) == 0 ? 0.0 : 9.0, b);
+        uint64_t blocked = umb_solid_blocks(&solids, &body, (const double(*)[3])a, (const double(*)[3])b);
+        assert_int_equal(umb_solid_blocks_all(&solids, &body, (const double(*)[3])a, (const double(*)[3])b), blocked == UINT64_MAX);
+        for (int i = 0; i < 64; i += 9) {
+            assert_int_equal(blocked >> i & 1, umb_solid_meets(&solids, &body, a[i / 8], b[i % 8]));
+        }
+        all[count > 32] += blocked == UINT64_MAX ? 1 : 0;
+        some[count > 32] += blocked != UINT64_MAX && blocked != 0 ? 1 : 0;
+    }
+    printf("%u and %u all blocked, %u and %u in part\n", all[0], all[1], some[0], some[1]);
+    assert_true(all[0] > 500 && all[1] > 500 && some[0] > 100 && some[1] > 100);
+}
+
 /* ---- beams ------------------------------------------------------------------------------------------ */
 
 typedef struct wall {
@@ -424,13 +574,15 @@ static umb_beam_part draw_triangle(dice *d, double x)
     return umb_beam_triangle((const double(*)[3])p);
 }
 
-/* A corner, or any point. */
+/* A corner, a point of an edge, or any. */
 static void point_of_triangle(dice *d, const umb_beam_part *p, double out[3])
 {
     double weights[3] = {dice_between(d, 0, 1), dice_between(d, 0, 1), dice_between(d, 0, 1)};
-    if (dice_roll(d, 3) == 0) {
+    uint32_t kind = dice_roll(d, 4);
+    if (kind < 2) { /* a corner, or in the middle of an edge */
         memset(weights, 0, sizeof weights);
-        weights[dice_roll(d, 3)] = 1.0;
+        weights[dice_roll(d, 3)] += 1.0;
+        weights[dice_roll(d, 3)] += kind;
     }
     double sum = weights[0] + weights[1] + weights[2];
     for (int k = 0; k < 3; ++k) {
@@ -444,10 +596,10 @@ static void point_of_part(dice *d, const umb_beam_part *p, double out[3])
         point_of_triangle(d, p, out);
         return;
     }
-    bool corner = dice_roll(d, 3) == 0;
+    uint32_t kind = dice_roll(d, 4);
     memcpy(out, p->middle, 3 * sizeof *out);
-    for (int a = 0; a < 3; ++a) {
-        double x = corner ? (dice_roll(d, 2) == 0 ? -1.0 : 1.0) : dice_between(d, -1, 1);
+    for (int a = 0; a < 3; ++a) { /* a corner, where halves of halves meet, or any */
+        double x = kind == 0 ? (dice_roll(d, 2) == 0 ? -1.0 : 1.0) : kind == 1 ? (int)dice_roll(d, 9) / 4.0 - 1.0 : dice_between(d, -1, 1);
         for (int k = 0; k < 3; ++k) {
             out[k] += x * p->axes[a][k];
         }
@@ -463,7 +615,9 @@ static void test_beams(void **state)
     for (uint32_t n = 0; n < tries; ++n) {
         uint32_t all[5] = {0, 1, 2, 3, 4};
         double far = dice_between(&d, 12, 40);
-        umb_beam_part a = draw_part(&d, 0.0), b = dice_roll(&d, 2) == 0 ? draw_part(&d, far) : draw_triangle(&d, far);
+        umb_beam_part a = dice_roll(&d, 3) > 0 ? draw_part(&d, 0.0) : draw_triangle(&d, 0.0);
+        umb_beam_part b = dice_roll(&d, 2) == 0 ? draw_part(&d, far) : draw_triangle(&d, far);
+        uint32_t effort = n % 8 == 0 ? 60000 : 3000;
         double from[3], to[3], at[3], part = dice_between(&d, 0.3, 0.7), wide = exp(dice_between(&d, log(1e-3), log(0.7)));
         point_of_part(&d, &a, from);
         point_of_part(&d, &b, to);
@@ -473,11 +627,11 @@ static void test_beams(void **state)
         wall w;
         dice same = d;
         make_wall(&d, at, wide, 60.0, false, &w);
-        umb_beam_search s = {&w.solids, 3000};
+        umb_beam_search s = {&w.solids, effort};
         bool thin = fabs(to[1] - from[1]) + fabs(to[2] - from[2]) < to[0] - from[0]; /* then it is through before it meets a side */
         assert_false(thin && umb_beam_blocked(&s, &a, &b, all, 4));
         make_wall(&same, at, wide, 60.0, true, &w);
-        s = (umb_beam_search){&w.solids, 3000};
+        s = (umb_beam_search){&w.solids, effort};
         blocked += umb_beam_blocked(&s, &a, &b, all, 5) ? 1 : 0;
     }
     printf("%u of %u blocked without a hole\n", blocked, tries);
@@ -488,7 +642,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_known_surfaces), cmocka_unit_test(test_moved_surfaces), cmocka_unit_test(test_inner_bodies),
-        cmocka_unit_test(test_touching),       cmocka_unit_test(test_pieces),          cmocka_unit_test(test_beams),
+        cmocka_unit_test(test_touching),       cmocka_unit_test(test_pieces),          cmocka_unit_test(test_apart),
+        cmocka_unit_test(test_blocks_all),     cmocka_unit_test(test_beams),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -241,6 +241,152 @@ static void test_shafts(void **state)
     umb_solid_tree_free(&tree, &a);
 }
 
+/* The box, made smaller by this much, has a point of the segment: exact but for rounding. */
+static bool goes_through(const umb_aabb *b, const double ends[2][3], double less)
+{
+    double from = 0.0, to = 1.0;
+    for (int k = 0; k < 3; ++k) {
+        double way = ends[1][k] - ends[0][k], low = b->min[k] + less - ends[0][k], high = b->max[k] - less - ends[0][k];
+        if (way == 0.0) {
+            from = low > 0.0 || high < 0.0 ? 2.0 : from;
+            continue;
+        }
+        from = fmax(from, fmin(low / way, high / way));
+        to = fmin(to, fmax(low / way, high / way));
+    }
+    return from <= to;
+}
+
+static bool is_listed(const uint32_t *list, uint32_t from, uint32_t to, uint32_t body)
+{
+    uint32_t times = 0;
+    for (uint32_t i = from; i < to; ++i) {
+        times += list[i] == body ? 1 : 0;
+    }
+    assert_true(times <= 1);
+    return times == 1;
+}
+
+/* Corner to corner, along an axis, a point, or any. */
+static void draw_segment(dice *d, const umb_solid *bodies, uint32_t count, double out[2][3])
+{
+    uint32_t kind = dice_roll(d, 4), axis = dice_roll(d, 3);
+    for (int e = 0; e < 2; ++e) {
+        const umb_aabb *b = &bodies[dice_roll(d, count)].bounds;
+        for (int k = 0; k < 3; ++k) {
+            out[e][k] = kind == 0 ? (dice_roll(d, 2) == 0 ? b->min[k] : b->max[k]) : between(d, -40, 40);
+            out[e][k] = e == 1 && (kind == 2 || (kind == 1 && (uint32_t)k != axis)) ? out[0][k] : out[e][k];
+        }
+    }
+}
+
+/* Of lists with room for all and with room for few: whatever the first segment meets is there, whether the second one meets it is
+ * known, and what is far from both is not. */
+static uint32_t check_along(dice *d, const umb_solid_tree *tree, const umb_solid *bodies, uint32_t count)
+{
+    double s[2][2][3];
+    uint32_t *list = malloc((count + 8) * sizeof *list), met = 0;
+    assert_non_null(list);
+    draw_segment(d, bodies, count, s[0]);
+    draw_segment(d, bodies, count, s[1]);
+    umb_solids_along n = umb_solid_tree_along(tree, (const double(*)[3])s[0], (const double(*)[3])s[1], count + 8, list);
+    assert_true(n.both_end <= n.first_begin && n.first_begin <= count + 8);
+    for (uint32_t i = 0; i < count; ++i) {
+        const umb_aabb *b = &bodies[i].bounds;
+        bool both = is_listed(list, 0, n.both_end, i), first = is_listed(list, n.first_begin, count + 8, i);
+        bool meets[2] = {goes_through(b, (const double(*)[3])s[0], 1e-4), goes_through(b, (const double(*)[3])s[1], 1e-4)};
+        assert_false(both && first);
+        met += meets[0] ? 1 : 0;
+        assert_true(both || first || !meets[0]);
+        assert_true(both || !(meets[0] && meets[1]));
+        assert_true(!(both || first) || goes_through(b, (const double(*)[3])s[0], -1e-3));
+        assert_true(!both || goes_through(b, (const double(*)[3])s[1], -1e-3));
+    }
+    uint32_t all = n.both_end + (count + 8 - n.first_begin), most = 1 + dice_roll(d, 12), few[12];
+    umb_solids_along m = umb_solid_tree_along(tree, (const double(*)[3])s[0], (const double(*)[3])s[1], most, few);
+    assert_int_equal(m.both_end == m.first_begin, all >= most);
+    assert_int_equal(m.both_end + (most - m.first_begin), all < most ? all : most);
+    for (uint32_t i = 0; i < m.both_end; ++i) {
+        assert_true(is_listed(list, 0, n.both_end, few[i]));
+    }
+    for (uint32_t i = m.first_begin; i < most; ++i) {
+        assert_true(is_listed(list, n.first_begin, count + 8, few[i]));
+    }
+    free(list);
+    return met;
+}
+
+/* Bodies of all sizes, some in one place, far from the middle too, where boxes of the tree are rounded. */
+static void test_along(void **state)
+{
+    (void)state;
+    static const uint32_t counts[] = {1, 2, 3, 4, 5, 17, 300};
+    umb_allocator a = umb_memory_allocator(NULL);
+    dice d = {15};
+    uint32_t met = 0;
+    for (uint32_t n = 0; n < (is_small() ? 70u : 700u); ++n) {
+        umb_solid bodies[300];
+        uint32_t count = counts[n % 7];
+        umb_solids solids = {.allocator = &a, .items = bodies, .count = count};
+        umb_solid_tree tree = {0};
+        memset(bodies, 0, sizeof bodies);
+        for (uint32_t i = 0; i < count; ++i) {
+            umb_aabb *b = &bodies[i].bounds;
+            draw_box(&d, 20, n % 3 == 0 ? 30.0 : 4.0, b->min, b->max);
+            if (n % 5 == 0 && i > 0 && i % 3 == 0) {
+                *b = bodies[0].bounds;
+            } else if (n % 5 == 1) {
+                b->max[dice_roll(&d, 3)] = b->min[dice_roll(&d, 3)];
+                for (int k = 0; k < 3; ++k) {
+                    b->max[k] = fmaxf(b->min[k], b->max[k]);
+                }
+            }
+        }
+        assert_true(umb_solid_tree_build(&tree, &a, &solids));
+        for (int i = 0; i < 60; ++i) {
+            met += check_along(&d, &tree, bodies, count);
+        }
+        umb_solid_tree_free(&tree, &a);
+    }
+    assert_true(met > 1000);
+    umb_solid_tree none = {0};
+    static const double segment[2][3] = {{0, 0, 0}, {1, 1, 1}};
+    umb_solids_along n = umb_solid_tree_along(&none, segment, segment, 4, (uint32_t[4]){0});
+    assert_true(n.both_end == 0 && n.first_begin == 4);
+}
+
+/* ---- floats --------------------------------------------------------------------------------------- */
+
+static void check_float(uint32_t bits)
+{
+    float x, above, below, next;
+    memcpy(&x, &bits, sizeof x);
+    above = umb_float_above(x);
+    below = umb_float_below(x);
+    if (isnan(x)) {
+        assert_true(isnan(above) && isnan(below));
+        return;
+    }
+    next = nextafterf(x, INFINITY);
+    assert_true(above == next);
+    assert_true(nextafterf(x, -INFINITY) == below);
+}
+
+/* As nextafterf() has it: around powers of two, zeros, the least and the greatest floats, infinities, and any. */
+static void test_next_floats(void **state)
+{
+    (void)state;
+    dice d = {16};
+    for (uint32_t e = 0; e < 512; ++e) {
+        for (uint32_t i = 0; i < 64; ++i) {
+            check_float((e << 23) + i - 32u);
+        }
+    }
+    for (uint32_t i = 0; i < (is_small() ? 100000u : 4000000u); ++i) {
+        check_float(dice_roll(&d, 1u << 16) << 16 | dice_roll(&d, 1u << 16));
+    }
+}
+
 /* ---- rays --------------------------------------------------------------------------------------- */
 
 /* Every horizontal ray that leaves the cell goes through a live pixel of one of the maps of the frames that look its
@@ -413,7 +559,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_slices),  cmocka_unit_test(test_joins), cmocka_unit_test(test_corners),
-        cmocka_unit_test(test_shafts),
+        cmocka_unit_test(test_shafts),  cmocka_unit_test(test_along), cmocka_unit_test(test_next_floats),
         cmocka_unit_test(test_rays),
         cmocka_unit_test(test_far),    cmocka_unit_test(test_kernels),
     };
