@@ -12,6 +12,7 @@
 
 #include <cmocka.h>
 
+#include "bake/region_state.h"
 #include "support/ray_bodies.h"
 #include "support/segments.h"
 
@@ -309,8 +310,22 @@ static void add_clutter(model *m, dice *d, uint32_t cube, const sight *s)
     }
 }
 
+/* Small things behind the cell: beside them it is large. */
+static void add_dust(model *m, dice *d, uint32_t cube, const sight *s, uint32_t count)
+{
+    for (uint32_t i = 0; i < count; ++i) {
+        umb_transform t = {{{0}}};
+        double away = 40.0 + 40.0 * dice_between(d, 0, 1);
+        for (int k = 0; k < 3; ++k) {
+            t.m[k][k] = (float)dice_between(d, 0.1, 0.3);
+            t.m[k][3] = (float)(s->from[k] - away * s->way[k] + dice_between(d, -10, 10));
+        }
+        (void)model_add_object(m, "dust", cube, &t);
+    }
+}
+
 /* Everything is the same with the hole filled. */
-static model *make_scene(uint64_t seed, const sight *s, bool filled)
+static model *make_scene(uint64_t seed, const sight *s, bool filled, uint32_t dust)
 {
     dice d = {seed};
     umb_error error;
@@ -324,6 +339,7 @@ static model *make_scene(uint64_t seed, const sight *s, bool filled)
     if (dice_roll(&d, 2) == 0) {
         add_clutter(m, &d, cube, s);
     }
+    add_dust(m, &d, cube, s, dust);
     assert_true(model_finish(m, NULL, &error));
     return m;
 }
@@ -352,9 +368,9 @@ static bool find_way(const model *m, const sight *s)
     return free_way;
 }
 
-enum { IN_PVS = 1, IN_REFINED = 2 };
+enum { IN_PVS = 1, IN_REFINED = 2, BY_PARTS = 4 };
 
-/* In which sets object 0 is. */
+/* In which sets object 0 is, and whether parts of the cell were asked about. */
 static int solve(const model *m, const sight *s, uint32_t effort)
 {
     umb_error error;
@@ -369,6 +385,7 @@ static int solve(const model *m, const sight *s, uint32_t effort)
     int in = a.pvs_count > 0 && a.pvs[0] == 0 ? IN_PVS : 0;
     assert_int_equal(umb_region_refine(region, effort, &a), UMB_OK);
     in |= a.refined_count > 0 && a.refined[0] == 0 ? IN_REFINED : 0;
+    in |= region->part != NULL ? BY_PARTS : 0;
     umb_region_destroy(region);
     umb_index_destroy(index);
     umb_scene_destroy(scene);
@@ -385,16 +402,16 @@ static void test_keyholes(void **state)
         draw_sight(&d, &s);
         uint64_t seed = 1000u + i;
         uint32_t effort = i % 3 == 0 ? 0 : i % 3 == 1 ? 64 : 20000;
-        model *m = make_scene(seed, &s, false);
+        model *m = make_scene(seed, &s, false, 0);
         if (find_way(m, &s)) {
             open += 1;
-            int in = solve(m, &s, effort);
+            int in = solve(m, &s, effort) & ~BY_PARTS;
             if (in != (IN_PVS | IN_REFINED)) {
                 printf("scene %u: hidden in set %d\n", i, in);
             }
             assert_int_equal(in, IN_PVS | IN_REFINED);
-            model *closed = make_scene(seed, &s, true);
-            in = i % 4 == 0 ? solve(closed, &s, effort) : IN_PVS | IN_REFINED;
+            model *closed = make_scene(seed, &s, true, 0);
+            in = i % 4 == 0 ? solve(closed, &s, effort) & ~BY_PARTS : IN_PVS | IN_REFINED;
             hidden += (in & IN_PVS) == 0 ? 1 : 0;
             refined += in == IN_PVS ? 1 : 0;
             model_free(closed);
@@ -405,8 +422,55 @@ static void test_keyholes(void **state)
     assert_true(open > tries / 4 && hidden > open / 40 && refined > open / 400);
 }
 
+/* The cell goes on around where the line starts, mostly farther on one side: a part of it sees through the hole. */
+static void enlarge_cell(dice *d, sight *s)
+{
+    bool corner = dice_roll(d, 4) == 0;
+    for (int k = 0; k < 3; ++k) {
+        bool up = s->from[k] == s->query.max[k] ? false : s->from[k] == s->query.min[k] || dice_roll(d, 2) == 0;
+        double more = dice_roll(d, 4) == 0 ? 0.0 : dice_between(d, 2, 12), less = corner ? 0.0 : dice_between(d, 0.1, 2);
+        s->query.max[k] += up ? more : less;
+        s->query.min[k] -= up ? less : more;
+    }
+}
+
+/* Large cells, which are cut into parts. */
+static void test_parts(void **state)
+{
+    (void)state;
+    dice d = {62};
+    uint32_t open = 0, parted = 0, refined = 0, by_parts = 0, tries = times(250);
+    for (uint32_t i = 0; i < tries; ++i) {
+        sight s;
+        do {
+            draw_sight(&d, &s);
+        } while (s.length < 50.0);
+        enlarge_cell(&d, &s);
+        uint64_t seed = 5000u + i;
+        uint32_t effort = i % 3 == 0 ? 0 : i % 3 == 1 ? 64 : 4000;
+        model *m = make_scene(seed, &s, false, 400);
+        if (find_way(m, &s)) {
+            open += 1;
+            int in = solve(m, &s, effort);
+            if ((in & ~BY_PARTS) != (IN_PVS | IN_REFINED)) {
+                printf("large cell %u: hidden in set %d\n", i, in);
+            }
+            assert_int_equal(in & ~BY_PARTS, IN_PVS | IN_REFINED);
+            parted += (in & BY_PARTS) != 0 ? 1 : 0;
+            model *closed = make_scene(seed, &s, true, 400);
+            in = i % 2 == 0 ? solve(closed, &s, effort) : IN_REFINED;
+            refined += (in & IN_REFINED) == 0 ? 1 : 0;
+            by_parts += in == (IN_PVS | BY_PARTS) ? 1 : 0;
+            model_free(closed);
+        }
+        model_free(m);
+    }
+    printf("%u keyholes of large cells, %u cut; without a hole %u hidden, %u where cells were cut\n", open, parted, refined, by_parts);
+    assert_true(open > tries / 4 && parted > open / 20 && by_parts > 0);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_keyholes)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_keyholes), cmocka_unit_test(test_parts)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
