@@ -36,6 +36,11 @@ static bool has(const uint32_t *ids, uint32_t count, uint32_t id)
     return false;
 }
 
+static umb_transform box_at(double x, double y, double z, double sx, double sy, double sz)
+{
+    return (umb_transform){{{(float)sx, 0, 0, (float)x}, {0, (float)sy, 0, (float)y}, {0, 0, (float)sz, (float)z}}};
+}
+
 /* Ascending lists. */
 static bool is_within(const uint32_t *a, uint32_t a_count, const uint32_t *b, uint32_t b_count)
 {
@@ -156,6 +161,101 @@ static void test_large_cells(void **state)
     assert_true(parted > 3);
 }
 
+/* ---- a hole that parts of a cell see through ------------------------------------------------------------------- */
+
+enum { TARGETS = 13 };
+
+/* A fence of planks before a long cell, with a hole so small that no sample finds it, and things in a row behind it: each is seen
+ * from a short piece of the cell alone. From above:
+ *
+ *      o  o  o  o  o  o  o  o  o  o  o  o  o
+ *
+ *             ----------- . -----------
+ *               [.....................]
+ */
+typedef struct fence {
+    double hole[3], wide, at[TARGETS][3], seen_from[TARGETS][3], seen_at[TARGETS][3];
+    uint32_t planks;
+    umb_region_query query;
+} fence;
+
+static void draw_fence(dice *d, fence *f)
+{
+    double near = 8.0 + 4.0 * unit(d), far = near * (3.0 + unit(d)), half = 0.4;
+    *f = (fence){.hole = {8.0, 0.2 + 0.4 * unit(d), near}, .wide = 0.002 + 0.004 * unit(d), .planks = 32 + dice_roll(d, 16)};
+    f->query = (umb_region_query){{0, 0, -0.25}, {16, 1, 0.25}, .up = UMB_UP_Y, .resolution = 128};
+    for (int i = 0; i < TARGETS; ++i) {
+        double x = 0.5 + 15.0 * i / (TARGETS - 1), from[3] = {x, f->hole[1] + 0.1 * unit(d) - 0.05, 0.0};
+        double along = far / near, front = (far - half - 1e-4) / near; /* just before it */
+        for (int k = 0; k < 3; ++k) {
+            f->seen_from[i][k] = from[k];
+            f->at[i][k] = from[k] + along * (f->hole[k] - from[k]);
+            f->seen_at[i][k] = from[k] + front * (f->hole[k] - from[k]);
+        }
+    }
+}
+
+static void add_cube_at(model *m, uint32_t cube, const char *name, const double min[3], const double max[3])
+{
+    umb_transform t = box_at(0.5 * (min[0] + max[0]), 0.5 * (min[1] + max[1]), 0.5 * (min[2] + max[2]), max[0] - min[0], max[1] - min[1], max[2] - min[2]);
+    (void)model_add_object(m, name, cube, &t);
+}
+
+/* Targets are numbers 0 to 12. */
+static model *make_fence(const fence *f, bool filled)
+{
+    umb_error error;
+    uint32_t cube;
+    model *m = model_with_cube(&cube);
+    for (int i = 0; i < TARGETS; ++i) {
+        const double *c = f->at[i];
+        add_cube_at(m, cube, "target", (double[3]){c[0] - 0.4, c[1] - 0.4, c[2] - 0.4}, (double[3]){c[0] + 0.4, c[1] + 0.4, c[2] + 0.4});
+    }
+    double step = 60.0 / f->planks, z[2] = {f->hole[2] - 0.001, f->hole[2] + 0.001};
+    for (uint32_t i = 0; i < f->planks; ++i) {
+        double x[2] = {-22.0 + step * i, -22.0 + step * (i + 1.2)};
+        bool hole = f->hole[0] > x[0] - 0.1 && f->hole[0] < x[1] + 0.1;
+        if (!hole || filled) {
+            add_cube_at(m, cube, "plank", (double[3]){x[0], -12, z[0]}, (double[3]){x[1], 12, z[1]});
+        } else {
+            add_cube_at(m, cube, "plank", (double[3]){x[0], -12, z[0]}, (double[3]){x[1], f->hole[1] - f->wide, z[1]});
+            add_cube_at(m, cube, "plank", (double[3]){x[0], f->hole[1] + f->wide, z[0]}, (double[3]){x[1], 12, z[1]});
+        }
+    }
+    assert_true(model_finish(m, NULL, &error));
+    return m;
+}
+
+static void test_fences(void **state)
+{
+    (void)state;
+    dice d = {104};
+    uint32_t seen = 0, parted = 0, hidden = 0, tries = cells(12, 60);
+    for (uint32_t n = 0; n < tries; ++n) {
+        fence f;
+        draw_fence(&d, &f);
+        for (int filled = 0; filled < 2; ++filled) {
+            world w;
+            umb_region_answer a;
+            open_model(&w, make_fence(&f, filled == 1), n % 2 == 0, false);
+            assert_int_equal(umb_region_solve(w.region, &f.query, &a), UMB_OK);
+            assert_int_equal(umb_region_refine(w.region, n % 3 == 0 ? 0 : 64, &a), UMB_OK);
+            parted += w.region->part != NULL ? 1 : 0;
+            for (uint32_t i = 0; i < TARGETS; ++i) {
+                bool in = has(a.refined, a.refined_count, i);
+                if (filled == 0 && segments_free_way(w.segments, f.seen_from[i], f.seen_at[i])) {
+                    seen += 1;
+                    assert_true(in);
+                }
+                hidden += filled == 1 && !in ? 1 : 0;
+            }
+            close_world(&w);
+        }
+    }
+    printf("%u seen through holes, %u cells cut of %u, %u hidden without a hole\n", seen, parted, 2 * tries, hidden);
+    assert_true(seen > 10 * tries && parted > tries / 2 && hidden > tries);
+}
+
 /* ---- new engines and used ones ---------------------------------------------------------------------------- */
 
 enum { CELLS = 7 };
@@ -245,11 +345,6 @@ static void test_used_engines(void **state)
 
 /* ---- after a commit ------------------------------------------------------------------------------------------ */
 
-static umb_transform box_at(double x, double y, double z, double sx, double sy, double sz)
-{
-    return (umb_transform){{{(float)sx, 0, 0, (float)x}, {0, (float)sy, 0, (float)y}, {0, 0, (float)sz, (float)z}}};
-}
-
 /* A wall, number 0, twenty boxes behind it, and things around that keep the scene as large as it is. */
 static model *make_yard(void)
 {
@@ -324,6 +419,7 @@ int main(int count, char **words)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_maps_only),
         cmocka_unit_test(test_large_cells),
+        cmocka_unit_test(test_fences),
         cmocka_unit_test(test_used_engines),
         cmocka_unit_test(test_moved_wall),
     };
