@@ -13,6 +13,7 @@
 
 #include "support/mutants.h"
 #include "support/region_worlds.h"
+#include "support/surfaces.h"
 
 static void run_scene(const char *name, bool weld, uint32_t cells, uint32_t rays, uint64_t seed)
 {
@@ -340,7 +341,81 @@ static void test_same_everywhere(void **state)
     umb_pool_destroy(pool);
 }
 
-/* Every request of memory fails once: an error comes back, nothing leaks, and the next try works. */
+/* Boxes, some of which lack a triangle, and a house of two wings and two storeys. */
+static void fill_scene(umb_scene *scene)
+{
+    umb_shape shape;
+    static const float corners[8][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}, {0, 0, 1}, {1, 0, 1}, {0, 1, 1}, {1, 1, 1}};
+    static const uint32_t faces[36] = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4, 2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
+    static const int none[3] = {0, 0, 0}, upper[3] = {0, 0, 4};
+    umb_shape_def def = {.positions = &corners[0][0], .position_count = 8, .indices = faces, .index_count = 33};
+    uint32_t id;
+    for (uint32_t i = 0; i < 60; ++i) {
+        def.index_count = i % 2 == 0 ? 36 : 33; /* convex, and open */
+        assert_int_equal(umb_scene_add_shape(scene, &def, &shape), UMB_OK);
+        umb_object_def object = {.shape = shape, .flags = UMB_OBJECT_IS_SHAPE,
+                                 .transform = {{{3, 0, 0, 4.0f * (float)(i % 8)}, {0, 3, 0, 0}, {0, 0, 3, 5.0f * (float)(i / 8)}}}};
+        assert_int_equal(umb_scene_add_object(scene, &object, &id), UMB_OK);
+    }
+    surface house = {.point_count = 0};
+    add_outline(&house, &CORNER, none, 4);
+    add_outline(&house, &CORNER, upper, 3);
+    umb_object_def object = {.flags = UMB_OBJECT_IS_SHAPE, .transform = {{{0.25f, 0, 0, -4}, {0, 0, 0.25f, 0}, {0, -0.25f, 0, 16}}}};
+    def = (umb_shape_def){.positions = &house.points[0][0], .position_count = house.point_count, .indices = &house.faces[0][0],
+                          .index_count = 3 * house.face_count};
+    assert_int_equal(umb_scene_add_shape(scene, &def, &object.shape), UMB_OK);
+    assert_int_equal(umb_scene_add_object(scene, &object, &id), UMB_OK);
+    assert_int_equal(umb_scene_commit(scene), UMB_OK);
+}
+
+/* What a query answers when nothing fails, and whether bodies and parts were there. */
+static id_set first_answer(umb_index *index, const umb_region_query *q, bool parts)
+{
+    umb_region *region;
+    umb_region_answer a;
+    assert_int_equal(umb_region_create(index, NULL, &region), UMB_OK);
+    assert_int_equal(umb_region_solve(region, q, &a), UMB_OK);
+    assert_int_equal(umb_region_refine(region, 0, &a), UMB_OK);
+    assert_true(region->found.count > 20 && region->solids.count > 20);
+    assert_int_equal(region->part != NULL, parts);
+    id_set first = id_set_copy(a.refined, a.refined_count);
+    umb_region_destroy(region);
+    return first;
+}
+
+static void expect_answer(const id_set *first, const umb_region_answer *a)
+{
+    assert_int_equal(first->count, a->refined_count);
+    assert_memory_equal(first->ids, a->refined, first->count * sizeof *first->ids);
+}
+
+/* Every request of memory fails once: an error comes back, nothing leaks, and the next try answers the same. */
+static void fail_each(failing *f, umb_index *index, const umb_region_query *q, bool parts)
+{
+    id_set first = first_answer(index, q, parts);
+    long long held = atomic_load(&f->held);
+    bool done = false;
+    for (long long limit = 0; !done; ++limit) {
+        umb_region *region = NULL;
+        umb_region_answer a;
+        atomic_store(&f->left, limit);
+        umb_result result = umb_region_create(index, NULL, &region);
+        result = result == UMB_OK ? umb_region_solve(region, q, &a) : result;
+        result = result == UMB_OK ? umb_region_refine(region, 0, &a) : result;
+        assert_true(result == UMB_OK || result == UMB_ERROR_MEMORY);
+        done = result == UMB_OK;
+        atomic_store(&f->left, 1 << 30);
+        if (region != NULL && !done) {
+            assert_int_equal(umb_region_solve(region, q, &a), UMB_OK);
+            assert_int_equal(umb_region_refine(region, 0, &a), UMB_OK);
+            expect_answer(&first, &a);
+        }
+        umb_region_destroy(region);
+        assert_int_equal(atomic_load(&f->held), held);
+    }
+    free(first.ids);
+}
+
 static void test_memory(void **state)
 {
     (void)state;
@@ -348,42 +423,12 @@ static void test_memory(void **state)
     umb_allocator allocator = failing_allocator(&f, 1 << 30);
     umb_scene *scene;
     umb_index *index;
-    umb_shape shape;
-    static const float corners[8][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}, {0, 0, 1}, {1, 0, 1}, {0, 1, 1}, {1, 1, 1}};
-    static const uint32_t faces[36] = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4, 2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
-    umb_shape_def def = {.positions = &corners[0][0], .position_count = 8, .indices = faces, .index_count = 33};
     assert_int_equal(umb_scene_create(&(umb_scene_def){.allocator = allocator}, &scene), UMB_OK);
-    for (uint32_t i = 0; i < 60; ++i) {
-        def.index_count = i % 2 == 0 ? 36 : 33; /* convex, and open */
-        assert_int_equal(umb_scene_add_shape(scene, &def, &shape), UMB_OK);
-        umb_object_def object = {.shape = shape, .flags = UMB_OBJECT_IS_SHAPE,
-                                 .transform = {{{3, 0, 0, 4.0f * (float)(i % 8)}, {0, 3, 0, 0}, {0, 0, 3, 5.0f * (float)(i / 8)}}}};
-        uint32_t id;
-        assert_int_equal(umb_scene_add_object(scene, &object, &id), UMB_OK);
-    }
-    assert_int_equal(umb_scene_commit(scene), UMB_OK);
+    fill_scene(scene);
     assert_int_equal(umb_index_create(scene, NULL, &index), UMB_OK);
-    long long held = atomic_load(&f.held);
-    umb_region_query q = {{-9, 1, 10}, {-6, 2, 12}, .resolution = 64};
-    bool done = false;
-    for (long long limit = 0; !done; ++limit) {
-        umb_region *region = NULL;
-        umb_region_answer a;
-        atomic_store(&f.left, limit);
-        umb_result result = umb_region_create(index, NULL, &region);
-        result = result == UMB_OK ? umb_region_solve(region, &q, &a) : result;
-        result = result == UMB_OK ? umb_region_refine(region, 0, &a) : result;
-        assert_true(result == UMB_OK || result == UMB_ERROR_MEMORY);
-        done = result == UMB_OK;
-        if (region != NULL && !done) {
-            atomic_store(&f.left, 1 << 30);
-            assert_int_equal(umb_region_solve(region, &q, &a), UMB_OK);
-            assert_int_equal(umb_region_refine(region, 0, &a), UMB_OK);
-        }
-        umb_region_destroy(region);
-        assert_int_equal(atomic_load(&f.held), held);
-    }
-    atomic_store(&f.left, 1 << 30);
+    fail_each(&f, index, &(umb_region_query){{-8, 1, 10}, {-7, 2, 12}, .resolution = 64}, false);
+    fail_each(&f, index, &(umb_region_query){{-9, 1, 10}, {-6, 2, 12}, .resolution = 64}, true);
+    fail_each(&f, index, &(umb_region_query){{-9, 1, 10}, {-6, 2, 12}, .resolution = 64, .maps_only = true}, true);
     umb_index_destroy(index);
     umb_scene_destroy(scene);
     assert_int_equal(atomic_load(&f.held), 0);

@@ -13,19 +13,6 @@
 
 #include "support/region_worlds.h"
 
-/* A copy of a list of ids. */
-typedef struct id_set {
-    uint32_t *ids, count;
-} id_set;
-
-static id_set copy_of(const uint32_t *ids, uint32_t count)
-{
-    id_set s = {malloc((count + 1) * sizeof *ids), count};
-    assert_non_null(s.ids);
-    memcpy(s.ids, ids, count * sizeof *ids);
-    return s;
-}
-
 static bool has(const uint32_t *ids, uint32_t count, uint32_t id)
 {
     for (uint32_t i = 0; i < count; ++i) {
@@ -75,7 +62,7 @@ static void compare_ways(world *w, umb_region_query q, tally *t, uint32_t *less,
     umb_region_answer a;
     q.maps_only = true;
     assert_int_equal(umb_region_solve(w->region, &q, &a), UMB_OK);
-    id_set maps = copy_of(a.pvs, a.pvs_count);
+    id_set maps = id_set_copy(a.pvs, a.pvs_count);
     assert_int_equal(a.stats.mapped, a.pvs_count);
     assert_true(a.stats.mapped_triangles == a.stats.pvs_triangles);
     assert_int_equal(umb_region_refine(w->region, 64, &a), UMB_OK);
@@ -121,7 +108,7 @@ static bool refine_again(world *w, const umb_region_query *q, tally *t, dice *d)
     static const uint32_t efforts[] = {4, 64, 700};
     umb_region_answer a;
     assert_int_equal(umb_region_solve(w->region, q, &a), UMB_OK);
-    id_set last = copy_of(a.pvs, a.pvs_count);
+    id_set last = id_set_copy(a.pvs, a.pvs_count);
     uint32_t pvs = a.pvs_count;
     check_hidden(w, q, a.pvs, a.pvs_count, 6, d, t);
     for (int i = 0; i < 3; ++i) {
@@ -130,7 +117,7 @@ static bool refine_again(world *w, const umb_region_query *q, tally *t, dice *d)
         assert_true(is_within(a.refined, a.refined_count, last.ids, last.count));
         assert_true(a.stats.undecided <= a.refined_count);
         free(last.ids);
-        last = copy_of(a.refined, a.refined_count);
+        last = id_set_copy(a.refined, a.refined_count);
     }
     check_hidden(w, q, a.refined, a.refined_count, 12, d, t);
     free(last.ids);
@@ -268,9 +255,9 @@ static both_sets solve_with(umb_region *region, const umb_region_query *q)
 {
     umb_region_answer a;
     assert_int_equal(umb_region_solve(region, q, &a), UMB_OK);
-    id_set pvs = copy_of(a.pvs, a.pvs_count);
+    id_set pvs = id_set_copy(a.pvs, a.pvs_count);
     assert_int_equal(umb_region_refine(region, 100, &a), UMB_OK);
-    return (both_sets){pvs, copy_of(a.refined, a.refined_count)};
+    return (both_sets){pvs, id_set_copy(a.refined, a.refined_count)};
 }
 
 static void expect_same(const both_sets *a, both_sets b)

@@ -606,6 +606,62 @@ static void point_of_part(dice *d, const umb_beam_part *p, double out[3])
     }
 }
 
+/* Corner i of a triangle. */
+static const double *corner(const umb_beam_part *p, int i)
+{
+    return i % 3 == 0 ? p->middle : p->axes[i % 3 - 1];
+}
+
+static void check_triangle_cut(const umb_beam_part *p, int axis, double share, const umb_beam_part *lower, const umb_beam_part *upper)
+{
+    const double *from = corner(p, axis), *to = corner(p, axis + 1), *at = corner(lower, axis + 1);
+    assert_memory_equal(corner(lower, axis), from, 3 * sizeof *from);
+    assert_memory_equal(corner(upper, axis + 1), to, 3 * sizeof *to);
+    assert_memory_equal(corner(upper, axis), at, 3 * sizeof *at);
+    assert_memory_equal(corner(lower, axis + 2), corner(p, axis + 2), 3 * sizeof *at);
+    assert_memory_equal(corner(upper, axis + 2), corner(p, axis + 2), 3 * sizeof *at);
+    for (int k = 0; k < 3; ++k) {
+        assert_true(fabs(at[k] - (from[k] + share * (to[k] - from[k]))) <= 0x1p-52 * (fabs(from[k]) + fabs(to[k])));
+    }
+}
+
+/* From one end of the axis to the other: every point is in a part, and the parts are no larger than they should be. */
+static void check_box_cut(const umb_beam_part *p, int axis, double share, const umb_beam_part *lower, const umb_beam_part *upper)
+{
+    int k = 0;
+    for (int i = 0; i < 3; ++i) {
+        k = fabs(p->axes[axis][i]) > fabs(p->axes[axis][k]) ? i : k;
+        if (i != axis) {
+            assert_memory_equal(lower->axes[i], p->axes[i], sizeof p->axes[i]);
+            assert_memory_equal(upper->axes[i], p->axes[i], sizeof p->axes[i]);
+        }
+    }
+    for (int i = 0; i <= 64 && p->axes[axis][k] != 0.0; ++i) {
+        double x = i / 32.0 - 1.0, at = p->middle[k] + x * p->axes[axis][k];
+        bool in[2] = {fabs(at - lower->middle[k]) <= fabs(lower->axes[axis][k]), fabs(at - upper->middle[k]) <= fabs(upper->axes[axis][k])};
+        assert_int_equal(in[0], x <= 2.0 * share - 1.0);
+        assert_int_equal(in[1], x >= 2.0 * share - 1.0);
+    }
+}
+
+/* Both parts of what is cut have all of it. */
+static void test_cuts(void **state)
+{
+    (void)state;
+    dice d = {79};
+    for (uint32_t n = 0; n < times(2000); ++n) {
+        umb_beam_part p = n % 2 == 0 ? draw_part(&d, dice_between(&d, -9, 9)) : draw_triangle(&d, dice_between(&d, -9, 9));
+        int axis = (int)dice_roll(&d, 3);
+        double share = 0.25 * (1.0 + dice_roll(&d, 3));
+        umb_beam_part lower = umb_beam_cut(&p, axis, share, false), upper = umb_beam_cut(&p, axis, share, true);
+        if (p.triangle) {
+            check_triangle_cut(&p, axis, share, &lower, &upper);
+        } else {
+            check_box_cut(&p, axis, share, &lower, &upper);
+        }
+    }
+}
+
 /* No beam is blocked through whose wall a segment goes. */
 static void test_beams(void **state)
 {
@@ -627,11 +683,11 @@ static void test_beams(void **state)
         wall w;
         dice same = d;
         make_wall(&d, at, wide, 60.0, false, &w);
-        umb_beam_search s = {&w.solids, effort};
+        umb_beam_search s = {&w.solids, effort, false};
         bool thin = fabs(to[1] - from[1]) + fabs(to[2] - from[2]) < to[0] - from[0]; /* then it is through before it meets a side */
         assert_false(thin && umb_beam_blocked(&s, &a, &b, all, 4));
         make_wall(&same, at, wide, 60.0, true, &w);
-        s = (umb_beam_search){&w.solids, effort};
+        s = (umb_beam_search){&w.solids, effort, false};
         blocked += umb_beam_blocked(&s, &a, &b, all, 5) ? 1 : 0;
     }
     printf("%u of %u blocked without a hole\n", blocked, tries);
@@ -643,7 +699,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_known_surfaces), cmocka_unit_test(test_moved_surfaces), cmocka_unit_test(test_inner_bodies),
         cmocka_unit_test(test_touching),       cmocka_unit_test(test_pieces),          cmocka_unit_test(test_apart),
-        cmocka_unit_test(test_blocks_all),     cmocka_unit_test(test_beams),
+        cmocka_unit_test(test_blocks_all),     cmocka_unit_test(test_cuts),           cmocka_unit_test(test_beams),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

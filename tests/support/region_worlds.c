@@ -83,8 +83,7 @@ static void draw_target(dice *d, const world *w, uint32_t object, double out[3])
     }
 }
 
-void check_hidden(const world *w, const umb_region_query *q, const uint32_t *ids, uint32_t count,
-                         uint32_t rays, dice *d, tally *t)
+void check_hidden(const world *w, const umb_region_query *q, const uint32_t *ids, uint32_t count, uint32_t rays, dice *d, tally *t)
 {
     uint8_t *seen = calloc(w->model->object_count + 1, 1);
     for (uint32_t i = 0; i < count; ++i) {
@@ -172,4 +171,12 @@ model *model_with_cube(uint32_t *out)
     model *m = model_create();
     *out = model_add_mesh(m, &mesh);
     return m;
+}
+
+id_set id_set_copy(const uint32_t *ids, uint32_t count)
+{
+    id_set s = {malloc((count + 1) * sizeof *ids), count};
+    assert_non_null(s.ids);
+    memcpy(s.ids, ids, count * sizeof *ids);
+    return s;
 }

@@ -35,8 +35,7 @@ typedef struct tally {
 } tally;
 
 /* No segment from the cell reaches an object that is not among the ids. */
-void check_hidden(const world *w, const umb_region_query *q, const uint32_t *ids, uint32_t count,
-                         uint32_t rays, dice *d, tally *t);
+void check_hidden(const world *w, const umb_region_query *q, const uint32_t *ids, uint32_t count, uint32_t rays, dice *d, tally *t);
 
 /* Solve and refine, and check what is hidden. */
 void ask(world *w, const umb_region_query *q, uint32_t rays, dice *d, tally *t);
@@ -46,6 +45,13 @@ void draw_cell(dice *d, const umb_aabb *b, umb_region_query *q);
 
 /* How to ask: resolution, squares, vertical and so on. */
 void draw_way(dice *d, umb_region_query *q);
+
+/* A copy of a list of ids; its ids are to be freed. */
+typedef struct id_set {
+    uint32_t *ids, count;
+} id_set;
+
+id_set id_set_copy(const uint32_t *ids, uint32_t count);
 
 /* A cube of side one around zero; out: the mesh's number. */
 model *model_with_cube(uint32_t *out);
