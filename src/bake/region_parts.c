@@ -85,16 +85,18 @@ umb_result umb_region_decide_parts(umb_region *r, uint32_t effort)
     if (r->part == NULL && umb_region_create(r->index, &def, &r->part) != UMB_OK) {
         return UMB_ERROR_MEMORY;
     }
-    for (uint32_t n = 0; n < count; ++n) {
+    umb_result result = UMB_OK;
+    for (uint32_t n = 0; n < count && result == UMB_OK; ++n) {
         umb_region_query q = part_of(&r->query, parts, n);
         umb_region_answer answer;
-        if (umb_region_solve(r->part, &q, &answer) != UMB_OK) {
-            return UMB_ERROR_MEMORY;
+        result = umb_region_solve(r->part, &q, &answer);
+        if (result == UMB_OK) {
+            decide_part(r, r->part, effort);
         }
-        decide_part(r, r->part, effort);
     }
     for (uint32_t i = 0; i < r->answer.pvs_count; ++i) {
-        r->verdicts[i] = r->verdicts[i] == UMB_UNDECIDED ? UMB_HIDDEN : r->verdicts[i] == KEPT ? UMB_UNDECIDED : r->verdicts[i];
+        uint8_t open = result == UMB_OK ? UMB_HIDDEN : UMB_UNDECIDED; /* in no part's set, if all were asked */
+        r->verdicts[i] = r->verdicts[i] == UMB_UNDECIDED ? open : r->verdicts[i] == KEPT ? UMB_UNDECIDED : r->verdicts[i];
     }
-    return UMB_OK;
+    return result;
 }
