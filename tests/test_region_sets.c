@@ -87,7 +87,7 @@ static void test_maps_only(void **state)
     for (int n = 0; n < 3; ++n) {
         world w;
         open_world(&w, names[n], n != 0);
-        for (uint32_t i = 0; i < cells(6, 30); ++i) {
+        for (uint32_t i = 0; i < cells(6, 16); ++i) {
             umb_region_query q = {0};
             draw_cell(&d, &w.model->bounds, &q);
             draw_way(&d, &q);
@@ -135,7 +135,7 @@ static void test_large_cells(void **state)
         world w;
         open_world(&w, names[n], n != 1);
         double width = 0.0;
-        for (uint32_t i = 0; i < (n == 2 ? cells(1, 4) : cells(3, 15)); ++i) {
+        for (uint32_t i = 0; i < (n == 2 ? cells(1, 3) : cells(3, 9)); ++i) {
             umb_region_query q = {.resolution = i % 3 == 0 ? 64 : 128};
             draw_large_cell(&d, &w, i == 0 ? 4.0 : width, &q);
             parted += refine_again(&w, &q, &t, &d) ? 1 : 0;
@@ -217,7 +217,7 @@ static void test_fences(void **state)
 {
     (void)state;
     dice d = {104};
-    uint32_t seen = 0, parted = 0, hidden = 0, tries = cells(12, 60);
+    uint32_t seen = 0, parted = 0, hidden = 0, tries = cells(12, 40);
     for (uint32_t n = 0; n < tries; ++n) {
         fence f;
         draw_fence(&d, &f);
