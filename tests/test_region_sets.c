@@ -184,7 +184,8 @@ static void draw_fence(dice *d, fence *f)
 
 static void add_cube_at(model *m, uint32_t cube, const char *name, const double min[3], const double max[3])
 {
-    umb_transform t = box_at(0.5 * (min[0] + max[0]), 0.5 * (min[1] + max[1]), 0.5 * (min[2] + max[2]), max[0] - min[0], max[1] - min[1], max[2] - min[2]);
+    umb_transform t = box_at(0.5 * (min[0] + max[0]), 0.5 * (min[1] + max[1]), 0.5 * (min[2] + max[2]), max[0] - min[0], max[1] - min[1],
+                             max[2] - min[2]);
     (void)model_add_object(m, name, cube, &t);
 }
 
