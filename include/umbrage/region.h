@@ -99,8 +99,8 @@ UMB_API umb_result umb_region_solve(umb_region *region, const umb_region_query *
 /* Look again at what the last umb_region_solve left, object by object, in all directions alike: objects that are
  * proved hidden go, by solids that each block a part of the cell from a part of the object (thesis 3.1 names the
  * loss that this takes back). A cell wider than objects are is cut into parts, sixteen at most, which are solved one by one for what
- * is undecided then: what is hidden from all parts is hidden from the cell. effort: how many parts a single object, and again its triangles if it
- * is not a box, may be cut into before it stays in; 0: 512.
+ * is undecided then: what is hidden from all parts is hidden from the cell. effort: how many parts a single object, and again
+ * its triangles if it is not a box, may be cut into before it stays in; 0: 512.
  * Safe direction: as above. *out is the whole answer again. Errors: UMB_ERROR_STATE without a solve before it,
  * no memory. */
 UMB_API umb_result umb_region_refine(umb_region *region, uint32_t effort, umb_region_answer *out);

@@ -79,21 +79,6 @@ void umb_region_decide(umb_region *region, uint32_t effort);
 /* The same for a cell that is large for what stands around it: by the maps of its parts first. Fails if memory does. */
 umb_result umb_region_decide_parts(umb_region *region, uint32_t effort);
 
-/* How wide an object is in the mean: the cube of as much surface. 0 if there is nothing. */
-double umb_region_width(const umb_region *region);
-
-/* How many pixels maps have for this cell: along s and along t. */
-void umb_region_grain(const umb_region *region, uint32_t *rows, uint32_t *columns);
-
-/* Decide about the objects of the set one by one whose verdict is open. */
-void umb_region_decide(umb_region *region, uint32_t effort);
-
-/* The same for a cell that is large for what stands around it: by the maps of its parts first. Fails if memory does. */
-umb_result umb_region_decide_parts(umb_region *region, uint32_t effort);
-
-/* How many parts a cell is cut into along each axis. */
-void umb_region_parts(const umb_region *region, uint32_t parts[3]);
-
 /* Fill in region->error and return code. */
 umb_result umb_region_fail(const umb_region *region, umb_result code, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
