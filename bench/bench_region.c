@@ -634,7 +634,8 @@ static bool print_all(study *s)
             continue;
         }
         print_table(s, s->rows[i].table);
-        if (s->plots != NULL && !s->rows[i].is_thesis && !plot_table(s, s->rows[i].table)) {
+        bool sweep = !s->rows[i].is_thesis && strchr(s->rows[i].table, ' ') == NULL;
+        if (s->plots != NULL && sweep && !plot_table(s, s->rows[i].table)) {
             return false;
         }
     }

@@ -36,8 +36,8 @@ typedef struct umb_region_query {
     umb_region_up up;
     /* Pixels along each side of an occlusion map: 64 to 2048, rounded up to a multiple of 64; 0: 512. Maps by offset and slope
        have a fifth of the pixels of such a square at most (without a vertical, where there are six maps, a sixteenth). With one
-       or two intervals: 11/8 N along the slope, more if the whole scene is far away, and along the offset what makes steps of a
-       an eighth of an object's width at 512. Else N along the slope, or up to sixteen times as many (8192 at most) and fewer along
+       or two intervals: 11/8 N along the slope, more if the whole scene is far away, and along the offset what makes steps of
+       about an eighth of an object's width at 512. Else N along the slope, or up to sixteen times as many (8192 at most) and fewer along
        the offset, where things are seen from far away for the cell's size. */
     uint32_t resolution;
     /* Intervals that are kept for each horizontal direction: 1 to 8; 0: 1 with half_umbra, 8 without a vertical, else 2. */

@@ -63,14 +63,14 @@ static uint32_t round_up(double x, uint32_t step, uint32_t most)
     return x < most ? ((uint32_t)x + step - 1) / step * step : most / step * step;
 }
 
-/* Where only a few intervals are kept, steps along the offset are an eighth of an object's width: finer ones find little more that is
+/* Where only a few intervals are kept, steps along the offset are about an eighth of an object's width: finer ones find little more that is
  * hidden, coarser ones leave cracks between neighbours. Bodies tell what is hidden far away (region_look.c), so slopes may be
  * coarse, unless all of the scene is far. */
 static void grain_of_objects(const umb_region *r, uint32_t most, uint32_t *rows, uint32_t *columns)
 {
     double size = r->frames[0].hu + r->frames[0].hv, share = r->query.resolution / 512.0, width = umb_region_width(r);
     *columns = round_up(share * fmax(704.0, 8.0 * gap_of(r) / width), UMB_TILE * UMB_TILE, most);
-    *rows = (uint32_t)fmin(ceil(share * 16.0 * size / width), r->query.resolution * r->query.resolution / 5.0 / *columns);
+    *rows = (uint32_t)fmin(ceil(share * 15.0 * size / width), r->query.resolution * r->query.resolution / 5.0 / *columns);
 }
 
 /* Answers do not depend on being right: the limits here are those that left the smallest sets in the same time in cities and box
