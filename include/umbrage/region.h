@@ -37,8 +37,8 @@ typedef struct umb_region_query {
     /* Pixels along each side of an occlusion map: 64 to 2048, rounded up to a multiple of 64; 0: 512. Maps by offset and slope
        have a fifth of the pixels of such a square at most (without a vertical, where there are six maps, a sixteenth). With one
        or two intervals: 11/8 N along the slope, more if the whole scene is far away, and along the offset what makes steps of
-       about an eighth of an object's width at 512. Else N along the slope, or up to sixteen times as many (8192 at most) and fewer along
-       the offset, where things are seen from far away for the cell's size. */
+       about an eighth of an object's width at 512. Else N along the slope, or up to sixteen times as many (8192 at most) and
+       fewer along the offset, where things are seen from far away for the cell's size. */
     uint32_t resolution;
     /* Intervals that are kept for each horizontal direction: 1 to 8; 0: 1 with half_umbra, 8 without a vertical, else 2. */
     uint32_t umbrae;
@@ -48,8 +48,7 @@ typedef struct umb_region_query {
     /* Only occluders that reach down to the lowest point of scene and cell, of which only the top is kept (the
        thesis's half-umbra). Faster; hides less where things float, stand on pillars or hang. Needs a vertical. */
     bool half_umbra;
-    /* Answer from the occlusion maps alone, as the thesis does: no look at single bodies after them. Larger sets, half the time
-       of small cells. */
+    /* Answer from the occlusion maps alone, as the thesis does: no look at single bodies after them. Larger sets, in less time. */
     bool maps_only;
     /* Sight-lines may start this far ahead of the eye: occluders within four times that distance of the cell are
        ignored. Then the set is right for views from within the cell whose near depth is at most near_depth and

@@ -6,7 +6,7 @@
 
 #define LEAST_PART 0x1p-19
 #define TRIALS 96
-#define MOST_CUTS 100 /* one after another */
+#define MOST_CUTS 64 /* one after another: UMB_BEAM_MARGIN says why not more */
 /* What a cut is worth: segments that it parts, a half that needs no further cut, how long what is cut is. These left the fewest
  * objects undecided in cities and box fields. */
 #define WHOLE 64

@@ -26,11 +26,7 @@ void umb_pieces_free(umb_pieces *p)
 
 static void world_vertex(const umb_occluder *o, uint32_t v, float out[3])
 {
-    if (o->identity) {
-        memcpy(out, o->mesh->positions[v], 3 * sizeof(float));
-    } else {
-        umb_transform_point(&o->transform, o->mesh->positions[v], out);
-    }
+    umb_transform_vertex(&o->transform, o->identity, o->mesh->positions[v], out);
 }
 
 static void point_of(const umb_occluder *o, uint32_t v, double out[3])

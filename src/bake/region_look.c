@@ -109,11 +109,7 @@ static bool highest_point(const umb_object *o, uint32_t up, double out[3])
     float highest[3] = {0.0f, 0.0f, 0.0f};
     for (uint32_t i = 0; i < m->position_count; ++i) {
         float w[3];
-        if (o->identity) {
-            memcpy(w, m->positions[i], sizeof w);
-        } else {
-            umb_transform_point(&o->transform, m->positions[i], w);
-        }
+        umb_transform_vertex(&o->transform, o->identity, m->positions[i], w);
         if (i == 0 || w[up] > highest[up]) {
             memcpy(highest, w, sizeof w);
         }

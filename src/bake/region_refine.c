@@ -44,11 +44,7 @@ static uint8_t decide_triangles(const refinement *f, const umb_object *o)
         double p[3][3];
         for (int c = 0; c < 3; ++c) {
             float w[3];
-            const float *v = m->positions[m->triangles[t][c]];
-            memcpy(w, v, sizeof w);
-            if (!o->identity) {
-                umb_transform_point(&o->transform, v, w);
-            }
+            umb_transform_vertex(&o->transform, o->identity, m->positions[m->triangles[t][c]], w);
             for (int k = 0; k < 3; ++k) {
                 p[c][k] = w[k];
             }

@@ -238,11 +238,7 @@ static bool object_hidden(umb_region *r, const umb_object *o)
     double p[UMB_RAY_POINTS][3];
     for (uint32_t i = 0; i < m->position_count; ++i) {
         float w[3];
-        if (o->identity) {
-            memcpy(w, m->positions[i], sizeof w);
-        } else {
-            umb_transform_point(&o->transform, m->positions[i], w);
-        }
+        umb_transform_vertex(&o->transform, o->identity, m->positions[i], w);
         for (int k = 0; k < 3; ++k) {
             p[i][k] = w[k];
         }

@@ -59,11 +59,7 @@ void umb_solid_vertices(const umb_occluder *o, double out[][3])
 {
     for (uint32_t i = 0; i < o->mesh->block_position_count; ++i) {
         float p[3];
-        if (o->identity) {
-            memcpy(p, o->mesh->positions[i], sizeof p);
-        } else {
-            umb_transform_point(&o->transform, o->mesh->positions[i], p);
-        }
+        umb_transform_vertex(&o->transform, o->identity, o->mesh->positions[i], p);
         for (int k = 0; k < 3; ++k) {
             out[i][k] = p[k];
         }

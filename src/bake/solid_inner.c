@@ -438,11 +438,7 @@ static bool begin(inner *in, const umb_solids *s, const umb_occluder *o)
         return false;
     }
     for (uint32_t i = 0; i < in->mesh->block_position_count; ++i) {
-        if (o->identity) {
-            memcpy(in->p[i], in->mesh->positions[i], sizeof in->p[i]);
-        } else {
-            umb_transform_point(&o->transform, in->mesh->positions[i], in->p[i]);
-        }
+        umb_transform_vertex(&o->transform, o->identity, in->mesh->positions[i], in->p[i]);
     }
     return true;
 }
